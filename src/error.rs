@@ -1,0 +1,65 @@
+//! What can go wrong, in words that say what would have been right.
+
+use std::fmt;
+use std::path::PathBuf;
+
+/// The error of every fallible call of the crate.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Error {
+    /// A value handed in cannot be used.
+    Argument {
+        /// What was handed in, for example `views[3].camera.fx`.
+        name: String,
+        /// The value as it was read.
+        value: String,
+        /// What would have been right.
+        expected: String,
+    },
+    /// A file cannot be read, understood or written.
+    File {
+        /// The file.
+        path: PathBuf,
+        /// The line, counted from 1, when the file is text.
+        line: Option<usize>,
+        /// What is wrong and what would have been right.
+        problem: String,
+    },
+    /// The progress hook asked to stop. Nothing that was finished is lost.
+    Cancelled,
+}
+
+/// `Result` with the crate's error.
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// A value handed in cannot be used; `expected` says what would have been right.
+    pub fn argument(name: impl Into<String>, value: impl fmt::Display, expected: impl Into<String>) -> Self {
+        Error::Argument { name: name.into(), value: value.to_string(), expected: expected.into() }
+    }
+
+    /// A file cannot be used.
+    pub fn file(path: impl Into<PathBuf>, problem: impl fmt::Display) -> Self {
+        Error::File { path: path.into(), line: None, problem: problem.to_string() }
+    }
+
+    /// A line of a text file cannot be used; lines count from 1.
+    pub fn line(path: impl Into<PathBuf>, line: usize, problem: impl fmt::Display) -> Self {
+        Error::File { path: path.into(), line: Some(line), problem: problem.to_string() }
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Error::Argument { name, value, expected } => write!(f, "{name} is {value}; expected {expected}"),
+            Error::File { path, line: Some(line), problem } => {
+                write!(f, "{}, line {line}: {problem}", path.display())
+            }
+            Error::File { path, line: None, problem } => write!(f, "{}: {problem}", path.display()),
+            Error::Cancelled => write!(f, "cancelled"),
+        }
+    }
+}
+
+impl std::error::Error for Error {}

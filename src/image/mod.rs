@@ -1,0 +1,7 @@
+//! Images as the solver sees them: grey bytes, their pyramid and the packed layout the kernels sample.
+
+mod packed;
+mod picture;
+
+pub use packed::PackedImage;
+pub use picture::Picture;

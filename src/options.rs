@@ -1,0 +1,289 @@
+//! Every number the method depends on, and the two presets.
+
+use crate::error::{Error, Result};
+use crate::simd::Level;
+
+/// The search on one scale of the pyramid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Scale {
+    /// How often the images are halved: 0 is full size, 1 half, 2 a quarter.
+    pub halvings: u32,
+    /// Food sources of each colony (FoodNumber), at least 2.
+    pub foods: u32,
+    /// Iterations of the first cycle on this scale (employed, onlooker and scout bees once each).
+    pub first_iterations: u32,
+    /// Cycles after the first; a geometric consistency check follows every cycle.
+    pub cycles: u32,
+    /// Iterations of each of those cycles.
+    pub cycle_iterations: u32,
+}
+
+/// Cost of a hypothesis over a pixel's view set S.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Aggregation {
+    /// The sum over S divided by |S| - 1, infinite for |S| <= 1 (equation 3 of the paper).
+    AllViews,
+    /// The mean over the best k views of S: views that cannot see the point yet do not count.
+    BestViews(u32),
+}
+
+/// How fused points are accepted (section 6 of the paper).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FusionOptions {
+    /// Largest relative difference of depths that agree.
+    pub depth_tolerance: f64,
+    /// Largest angle between normals that agree, in degrees.
+    pub normal_tolerance: f64,
+    /// Other views that must agree.
+    pub min_views: u32,
+}
+
+/// All options. Start from a preset; every field may be changed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// Seed of the random generator; the same seed gives the same bits.
+    pub seed: u64,
+    /// Worker threads; 0 takes one for each core.
+    pub threads: usize,
+    /// Instruction set of the kernels; `None` takes the best there is. The result does not depend on it.
+    pub simd: Option<Level>,
+
+    /// The scales from coarse to fine; the last must be full size.
+    pub scales: Vec<Scale>,
+    /// A food source tried more often than this without improving may be replaced by a scout bee.
+    pub trial_limit: u32,
+    /// A scale ends early once fewer than this share of the pixels changed in a cycle.
+    pub stop_share: f64,
+
+    /// Half the side of the square window, in pixels.
+    pub window_radius: u32,
+    /// Distance between samples of the window, in pixels.
+    pub window_step: u32,
+    /// Spatial sigma of the bilateral weight, in pixels.
+    pub spatial_sigma: f64,
+    /// Colour sigma of the bilateral weight, intensities in [0, 1].
+    pub colour_sigma: f64,
+    /// Weighted variance under which a window has no texture and costs 2, intensities in [0, 1].
+    pub min_variance: f64,
+    /// How the costs of the source views become one.
+    pub aggregation: Aggregation,
+
+    /// Whether the view set of each pixel is refined by incidence and visibility. Off keeps the start set.
+    pub view_selection: bool,
+    /// Triangulation angles of the start set, in degrees.
+    pub triangulation_angle: (f64, f64),
+    /// At most this many source views a reference view, the best by angle and shared points; 0 takes all.
+    pub max_sources: u32,
+    /// Largest angle between normal and the ray to a source view, in degrees.
+    pub max_incident_angle: f64,
+    /// A point is occluded when a validated depth lies in front of it by more than this share.
+    pub occlusion_margin: f64,
+
+    /// Fitness added, in the comparison only, to a plane offered by a validated neighbour; 0 is none.
+    pub reward: f64,
+    /// Whether consistent solutions are offered to other views.
+    pub propagation: bool,
+
+    /// Cost per percent of disagreement with a source's validated depth; 0 is none (`paper`).
+    pub geometric_weight: f64,
+    /// Disagreement at which that cost stops growing, in percent.
+    pub geometric_limit: f64,
+    /// Disagreement assumed where the source has no validated depth, in percent.
+    pub geometric_unknown: f64,
+
+    /// Largest relative difference of depths that are consistent.
+    pub depth_tolerance: f64,
+    /// Largest angle between normals that are consistent, in degrees.
+    pub normal_tolerance: f64,
+    /// Sources that must be consistent for a solution to be validated.
+    pub min_consistent: u32,
+    /// Share of the pixel's sources that must be consistent.
+    pub consistent_share: f64,
+    /// Whether a source whose own depth lies clearly in front abstains: it may be the occluder.
+    pub occluders_abstain: bool,
+
+    /// Fusion.
+    pub fusion: FusionOptions,
+}
+
+impl Options {
+    /// Names of the presets.
+    pub const PRESETS: [&'static str; 2] = ["default", "paper"];
+
+    /// The preset of this name.
+    pub fn preset(name: &str) -> Result<Options> {
+        match name {
+            "default" => Ok(Options::default()),
+            "paper" => Ok(Options::paper()),
+            _ => Err(Error::argument("preset", name, format!("one of {}", Self::PRESETS.join(", ")))),
+        }
+    }
+
+    /// The paper as literally as its text allows; what it leaves open is said at each option.
+    pub fn paper() -> Options {
+        Options {
+            seed: 0,
+            threads: 0,
+            simd: None,
+            // FoodNumber is the paper's; it never gives its numbers of iterations and cycles.
+            scales: vec![Scale { halvings: 0, foods: 10, first_iterations: 20, cycles: 3, cycle_iterations: 2 }],
+            trial_limit: 10,
+            stop_share: 0.01,
+            window_radius: 5,
+            window_step: 2,
+            spatial_sigma: 5.0,
+            colour_sigma: 0.2,
+            min_variance: 1e-5,
+            aggregation: Aggregation::AllViews,
+            view_selection: true,
+            triangulation_angle: (10.0, 30.0),
+            max_sources: 0,
+            max_incident_angle: 80.0,
+            occlusion_margin: 0.01,
+            reward: 0.05,
+            propagation: true,
+            geometric_weight: 0.0,
+            geometric_limit: 3.0,
+            geometric_unknown: 1.5,
+            // The paper's 0.01 mm is impossible on a scene of 600 mm; its fusion calls the difference relative.
+            depth_tolerance: 0.01,
+            normal_tolerance: 30.0,
+            min_consistent: 2,
+            consistent_share: 0.7,
+            occluders_abstain: false,
+            fusion: FusionOptions { depth_tolerance: 0.01, normal_tolerance: 30.0, min_views: 4 },
+        }
+    }
+
+    /// Refuses values no run can be made with, naming the option.
+    pub fn check(&self) -> Result<()> {
+        self.check_scales()?;
+        check_whole("window_radius", self.window_radius, 1, 16)?;
+        check_whole("window_step", self.window_step, 1, 8)?;
+        check_whole("min_consistent", self.min_consistent, 1, u32::MAX)?;
+        if let Aggregation::BestViews(views) = self.aggregation {
+            check_whole("aggregation.best_views", views, 1, 64)?;
+        }
+        check_number("stop_share", self.stop_share, 0.0, 1.0)?;
+        check_number("spatial_sigma", self.spatial_sigma, 1e-3, 1e6)?;
+        check_number("colour_sigma", self.colour_sigma, 1e-3, 1e6)?;
+        check_number("min_variance", self.min_variance, 0.0, 1.0)?;
+        check_number("triangulation_angle.min", self.triangulation_angle.0, 0.0, 180.0)?;
+        check_number("triangulation_angle.max", self.triangulation_angle.1, self.triangulation_angle.0, 180.0)?;
+        check_number("max_incident_angle", self.max_incident_angle, 0.0, 90.0)?;
+        check_number("occlusion_margin", self.occlusion_margin, 0.0, 1.0)?;
+        check_number("reward", self.reward, 0.0, 1.0)?;
+        check_number("geometric_weight", self.geometric_weight, 0.0, 1e3)?;
+        check_number("geometric_limit", self.geometric_limit, 0.0, 1e3)?;
+        check_number("geometric_unknown", self.geometric_unknown, 0.0, 1e3)?;
+        check_number("depth_tolerance", self.depth_tolerance, 0.0, 1.0)?;
+        check_number("normal_tolerance", self.normal_tolerance, 0.0, 180.0)?;
+        check_number("consistent_share", self.consistent_share, 0.0, 1.0)?;
+        check_number("fusion.depth_tolerance", self.fusion.depth_tolerance, 0.0, 1.0)?;
+        check_number("fusion.normal_tolerance", self.fusion.normal_tolerance, 0.0, 180.0)
+    }
+
+    fn check_scales(&self) -> Result<()> {
+        let descending = self.scales.windows(2).all(|pair| pair[0].halvings > pair[1].halvings);
+        if !descending || self.scales.last().is_none_or(|last| last.halvings != 0) {
+            let halvings: Vec<u32> = self.scales.iter().map(|scale| scale.halvings).collect();
+            return Err(Error::argument("scales", format!("{halvings:?}"), "halvings that descend to 0"));
+        }
+        for scale in &self.scales {
+            check_whole("scales.halvings", scale.halvings, 0, 8)?;
+            check_whole("scales.foods", scale.foods, 2, 64)?;
+            check_whole("scales.first_iterations", scale.first_iterations, 0, 10_000)?;
+            check_whole("scales.cycles", scale.cycles, 0, 1_000)?;
+            check_whole("scales.cycle_iterations", scale.cycle_iterations, 0, 10_000)?;
+        }
+        Ok(())
+    }
+
+    /// Every option by name with its value, for reports and listings.
+    pub fn entries(&self) -> Vec<(&'static str, String)> {
+        let scale = |s: &Scale| {
+            format!(
+                "1/{}: {} foods, {} + {}x{} iterations",
+                1u32 << s.halvings,
+                s.foods,
+                s.first_iterations,
+                s.cycles,
+                s.cycle_iterations
+            )
+        };
+        let simd = self.simd.map_or("best".to_owned(), |level| level.name().to_owned());
+        let aggregation = match self.aggregation {
+            Aggregation::AllViews => "sum over S / (|S| - 1)".to_owned(),
+            Aggregation::BestViews(views) => format!("mean of the best {views}"),
+        };
+        let angles = self.triangulation_angle;
+        vec![
+            ("seed", self.seed.to_string()),
+            ("threads", self.threads.to_string()),
+            ("simd", simd),
+            ("scales", self.scales.iter().map(scale).collect::<Vec<_>>().join("; ")),
+            ("trial_limit", self.trial_limit.to_string()),
+            ("stop_share", self.stop_share.to_string()),
+            ("window_radius", self.window_radius.to_string()),
+            ("window_step", self.window_step.to_string()),
+            ("spatial_sigma", self.spatial_sigma.to_string()),
+            ("colour_sigma", self.colour_sigma.to_string()),
+            ("min_variance", self.min_variance.to_string()),
+            ("aggregation", aggregation),
+            ("view_selection", self.view_selection.to_string()),
+            ("triangulation_angle", format!("{} to {}", angles.0, angles.1)),
+            ("max_sources", self.max_sources.to_string()),
+            ("max_incident_angle", self.max_incident_angle.to_string()),
+            ("occlusion_margin", self.occlusion_margin.to_string()),
+            ("reward", self.reward.to_string()),
+            ("propagation", self.propagation.to_string()),
+            ("geometric_weight", self.geometric_weight.to_string()),
+            ("geometric_limit", self.geometric_limit.to_string()),
+            ("geometric_unknown", self.geometric_unknown.to_string()),
+            ("depth_tolerance", self.depth_tolerance.to_string()),
+            ("normal_tolerance", self.normal_tolerance.to_string()),
+            ("min_consistent", self.min_consistent.to_string()),
+            ("consistent_share", self.consistent_share.to_string()),
+            ("occluders_abstain", self.occluders_abstain.to_string()),
+            ("fusion.depth_tolerance", self.fusion.depth_tolerance.to_string()),
+            ("fusion.normal_tolerance", self.fusion.normal_tolerance.to_string()),
+            ("fusion.min_views", self.fusion.min_views.to_string()),
+        ]
+    }
+}
+
+impl Default for Options {
+    /// What measures best today.
+    fn default() -> Options {
+        Options {
+            scales: vec![
+                Scale { halvings: 1, foods: 4, first_iterations: 6, cycles: 4, cycle_iterations: 1 },
+                Scale { halvings: 0, foods: 3, first_iterations: 2, cycles: 3, cycle_iterations: 1 },
+            ],
+            spatial_sigma: 4.0,
+            colour_sigma: 0.05,
+            aggregation: Aggregation::BestViews(3),
+            max_sources: 10,
+            reward: 0.1,
+            geometric_weight: 0.2,
+            consistent_share: 0.5,
+            occluders_abstain: true,
+            fusion: FusionOptions { min_views: 3, ..Options::paper().fusion },
+            ..Options::paper()
+        }
+    }
+}
+
+fn check_whole(name: &str, value: u32, min: u32, max: u32) -> Result<()> {
+    if (min..=max).contains(&value) {
+        return Ok(());
+    }
+    Err(Error::argument(format!("options.{name}"), value, format!("a whole number from {min} to {max}")))
+}
+
+fn check_number(name: &str, value: f64, min: f64, max: f64) -> Result<()> {
+    if (min..=max).contains(&value) {
+        return Ok(());
+    }
+    Err(Error::argument(format!("options.{name}"), value, format!("a number from {min} to {max}")))
+}

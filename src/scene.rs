@@ -1,0 +1,163 @@
+//! What is handed in: views with image, camera, mask and depth range, and sparse points.
+
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+use crate::image::Picture;
+use glam::DVec3;
+
+/// The depths at which surfaces are looked for, in world units, `0 < near < far`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DepthRange {
+    /// The smallest depth.
+    pub near: f64,
+    /// The largest depth.
+    pub far: f64,
+}
+
+/// One calibrated photograph.
+#[derive(Debug, Clone)]
+pub struct View {
+    /// A name for messages and files.
+    pub name: String,
+    /// The photograph, of the camera's size.
+    pub picture: Picture,
+    /// Where it was taken from.
+    pub camera: Camera,
+    /// `true` where a depth is wanted, row by row, one a pixel; `None` wants all. A masked pixel still serves as
+    /// source for other views.
+    pub mask: Option<Vec<bool>>,
+    /// Where to look for surfaces; `None` takes it from the sparse points.
+    pub depth_range: Option<DepthRange>,
+}
+
+/// A point triangulated by structure from motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SparsePoint {
+    /// World position.
+    pub position: DVec3,
+    /// Indices into the scene's views that saw it.
+    pub views: Vec<u32>,
+}
+
+/// Calibrated photographs, checked.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    views: Vec<View>,
+    points: Vec<SparsePoint>,
+    depth_ranges: Vec<DepthRange>,
+}
+
+impl Scene {
+    /// Checks every view and point and settles each view's depth range: its own, else the 1st to 99th percentile of
+    /// the depths of the sparse points it saw, widened by a quarter on both sides.
+    ///
+    /// # Errors
+    /// Fewer than two views; a name that occurs twice; a picture or mask of another size than its camera; a camera,
+    /// range or point that is not finite or makes no sense; a point that names a view there is not; a view with
+    /// neither range nor sparse points.
+    pub fn new(views: Vec<View>, points: Vec<SparsePoint>) -> Result<Scene> {
+        if views.len() < 2 {
+            return Err(Error::argument("views", views.len(), "at least 2 views: depth needs another view"));
+        }
+        check_names(&views)?;
+        for (index, view) in views.iter().enumerate() {
+            check_view(view, &format!("views[{index}] ({})", view.name))?;
+        }
+        for (index, point) in points.iter().enumerate() {
+            if !point.position.is_finite() {
+                return Err(Error::argument(format!("points[{index}]"), point.position, "finite coordinates"));
+            }
+            if let Some(view) = point.views.iter().find(|&&view| view as usize >= views.len()) {
+                let expected = format!("an index below the number of views, {}", views.len());
+                return Err(Error::argument(format!("points[{index}].views"), view, expected));
+            }
+        }
+        let depth_ranges = (0..views.len())
+            .map(|view| match views[view].depth_range {
+                Some(range) => Ok(range),
+                None => range_of_points(&views, view, &points),
+            })
+            .collect::<Result<_>>()?;
+        Ok(Scene { views, points, depth_ranges })
+    }
+
+    /// The views in the order they were handed in.
+    pub fn views(&self) -> &[View] {
+        &self.views
+    }
+
+    /// The sparse points.
+    pub fn points(&self) -> &[SparsePoint] {
+        &self.points
+    }
+
+    /// The depth range of one view.
+    pub fn depth_range(&self, view: usize) -> DepthRange {
+        self.depth_ranges[view]
+    }
+}
+
+fn check_names(views: &[View]) -> Result<()> {
+    let mut seen = std::collections::HashSet::new();
+    match views.iter().find(|view| !seen.insert(view.name.as_str())) {
+        Some(view) => Err(Error::argument("views", format!("{} twice", view.name), "a different name for each view")),
+        None => Ok(()),
+    }
+}
+
+fn check_view(view: &View, name: &str) -> Result<()> {
+    view.camera.check(&format!("{name}.camera"))?;
+    let (width, height) = (view.picture.width(), view.picture.height());
+    if (width, height) != (view.camera.width, view.camera.height) {
+        let expected = format!("the camera's size, {}x{}", view.camera.width, view.camera.height);
+        return Err(Error::argument(format!("{name}.picture"), format!("{width}x{height}"), expected));
+    }
+    if let Some(mask) = &view.mask
+        && mask.len() != view.camera.pixels()
+    {
+        let expected = format!("one for each of the {} pixels", view.camera.pixels());
+        return Err(Error::argument(format!("{name}.mask"), format!("{} values", mask.len()), expected));
+    }
+    match view.depth_range {
+        Some(range) => range.check(&format!("{name}.depth_range")),
+        None => Ok(()),
+    }
+}
+
+impl DepthRange {
+    /// Refuses a range that holds no depth; `name` is how the error calls it.
+    pub fn check(&self, name: &str) -> Result<()> {
+        if self.near > 0.0 && self.near < self.far && self.far.is_finite() {
+            return Ok(());
+        }
+        Err(Error::argument(name, format!("{} to {}", self.near, self.far), "finite depths with 0 < near < far"))
+    }
+}
+
+/// Percentiles of the depths of sparse points that bound a view's range: outliers of the triangulation lie beyond.
+const RANGE_PERCENTILES: (f64, f64) = (0.01, 0.99);
+/// Surfaces without features may lie before and behind all points by this share of the depth.
+const RANGE_MARGIN: f64 = 0.25;
+
+fn range_of_points(views: &[View], view: usize, points: &[SparsePoint]) -> Result<DepthRange> {
+    let depth = |point: &SparsePoint| views[view].camera.to_camera(point.position).z;
+    let mut depths: Vec<f64> = points
+        .iter()
+        .filter(|point| point.views.contains(&(view as u32)))
+        .map(depth)
+        .filter(|&depth| depth > 0.0)
+        .collect();
+    if depths.is_empty() {
+        return Err(Error::argument(
+            format!("depth range of {}", views[view].name),
+            "unknown",
+            "sparse points that this view saw, or a depth range given by hand (--depth-range MIN MAX)",
+        ));
+    }
+    depths.sort_by(f64::total_cmp);
+    let percentile = |share: f64| depths[((depths.len() - 1) as f64 * share).round() as usize];
+    Ok(DepthRange {
+        near: percentile(RANGE_PERCENTILES.0) * (1.0 - RANGE_MARGIN),
+        far: percentile(RANGE_PERCENTILES.1) * (1.0 + RANGE_MARGIN),
+    })
+}
