@@ -47,6 +47,9 @@ impl CostRules {
     }
 }
 
+/// The largest k of [`Aggregation::BestViews`].
+pub const MAX_BEST_VIEWS: usize = 8;
+
 /// A source view of the pixel at work.
 #[derive(Debug, Clone, Copy)]
 struct PixelView {
@@ -245,13 +248,13 @@ impl<'a, S: Simd> Evaluator<'a, S> {
 /// The sum of the `best` smallest costs.
 #[inline(always)]
 fn sum_of_least(candidates: &[Candidate], best: usize) -> f32 {
-    let mut least = [f32::INFINITY; 8];
+    let mut least = [f32::INFINITY; MAX_BEST_VIEWS];
     for candidate in candidates {
         let mut cost = candidate.least;
+        // Without branches: which costs are small cannot be predicted.
         for place in &mut least[..best] {
-            if cost < *place {
-                std::mem::swap(place, &mut cost);
-            }
+            let (smaller, larger) = (place.min(cost), place.max(cost));
+            (*place, cost) = (smaller, larger);
         }
     }
     least[..best].iter().sum()
