@@ -1,1 +1,24 @@
-//! Scene and map files.
+//! Scene and map files: COLMAP models, maps and clouds, pictures, and the folders they lie in.
+//!
+//! Every file is written to a temporary name in its folder and renamed, so a file that is there is whole; missing
+//! parent folders are made. Readers compare every count with the file's size before they believe it.
+
+mod colmap_maps;
+mod colmap_model;
+mod files;
+mod pictures;
+mod ply;
+mod previews;
+mod scene_folder;
+mod workspace;
+
+pub use colmap_maps::{
+    ConsistencyGraph, Grid, read_consistency_graph, read_depth_map, read_normal_map, write_consistency_graph,
+    write_depth_map, write_normal_map,
+};
+pub use colmap_model::{ColmapModel, ModelImage};
+pub use pictures::{picture_size, read_picture};
+pub use ply::{read_ply, read_visibility, write_ply, write_visibility};
+pub use previews::{write_depth_preview, write_normal_preview, write_views_preview};
+pub use scene_folder::{SceneFolder, read_scene};
+pub use workspace::{MapKind, Workspace, WorkspaceMaps, WorkspaceView};

@@ -1,0 +1,68 @@
+//! COLMAP's sparse models: cameras, poses and points, in its text and its binary layout.
+
+mod binary;
+mod records;
+mod text;
+
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+use crate::scene::SparsePoint;
+use records::Files;
+use std::path::Path;
+
+/// An image of a model: its name, calibration and pose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelImage {
+    /// The image's path below the folder of images, parts separated by `/`.
+    pub name: String,
+    /// Calibration and pose, in the crate's convention (COLMAP's pixel centres lie half a pixel further).
+    pub camera: Camera,
+}
+
+/// A sparse model without distortion.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ColmapModel {
+    /// The images in the order of the file, which is what consistency graphs and `fused.ply.vis` count along.
+    pub images: Vec<ModelImage>,
+    /// The points, with the indices of the images that saw them in ascending order. Their colours and errors and
+    /// the images' features are not kept.
+    pub points: Vec<SparsePoint>,
+}
+
+impl ColmapModel {
+    /// Whether the folder holds the files of a model, binary or text.
+    pub fn is_in(folder: &Path) -> bool {
+        Files::find(folder).is_some()
+    }
+
+    /// Reads `cameras`, `images` and, when it is there, `points3D` from a folder: the `.bin` files, else the `.txt`
+    /// files, as COLMAP chooses. Points that no file holds are no points.
+    ///
+    /// # Errors
+    /// No model there; a camera model with distortion; ids or names that occur twice; ids that do not exist; names
+    /// that lead out of their folder; sizes of 0 and numbers that are not finite; a zero quaternion; files that end
+    /// early or go on; a model without images.
+    pub fn read(folder: &Path) -> Result<ColmapModel> {
+        let Some(files) = Files::find(folder) else {
+            let wanted =
+                "neither cameras.bin and images.bin nor cameras.txt and images.txt are in this folder";
+            return Err(Error::file(folder, format!("no COLMAP model: {wanted}")));
+        };
+        let records = if files.binary { binary::read(&files)? } else { text::read(&files)? };
+        records.resolve(&files)
+    }
+
+    /// Writes `cameras.txt`, `images.txt` and `points3D.txt`. Points get the projections of their positions as
+    /// features, grey as colour and 0 as error.
+    ///
+    /// # Panics
+    /// A point names an image there is not.
+    pub fn write_text(&self, folder: &Path) -> Result<()> {
+        text::write(self, folder)
+    }
+
+    /// Writes `cameras.bin`, `images.bin` and `points3D.bin` with the same content as [`ColmapModel::write_text`].
+    pub fn write_binary(&self, folder: &Path) -> Result<()> {
+        binary::write(self, folder)
+    }
+}

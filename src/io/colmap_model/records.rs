@@ -1,0 +1,293 @@
+//! What the files of a model say before ids are resolved, and what is checked alike for text and binary.
+
+use super::{ColmapModel, ModelImage};
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+use crate::scene::SparsePoint;
+use glam::{DMat3, DQuat, DVec2, DVec3};
+use std::collections::{HashMap, HashSet};
+use std::fmt::Display;
+use std::path::{Component, Path, PathBuf};
+
+/// COLMAP puts the centre of the top-left pixel at (0.5, 0.5), the crate at (0, 0).
+const HALF_PIXEL: f64 = 0.5;
+
+/// COLMAP's camera models in the order of their numbers in binary files.
+const MODELS: [&str; 12] = [
+    "SIMPLE_PINHOLE",
+    "PINHOLE",
+    "SIMPLE_RADIAL",
+    "RADIAL",
+    "OPENCV",
+    "OPENCV_FISHEYE",
+    "FULL_OPENCV",
+    "FOV",
+    "SIMPLE_RADIAL_FISHEYE",
+    "RADIAL_FISHEYE",
+    "THIN_PRISM_FISHEYE",
+    "RAD_TAN_THIN_PRISM_FISHEYE",
+];
+/// The number of PINHOLE in binary files, the only model that is written.
+pub(super) const PINHOLE_NUMBER: u32 = 1;
+
+const UNDISTORT: &str = "colmap image_undistorter --image_path IMAGES --input_path SPARSE --output_path DIR";
+
+/// The three files of a model.
+pub(super) struct Files {
+    pub binary: bool,
+    pub cameras: PathBuf,
+    pub images: PathBuf,
+    pub points: PathBuf,
+}
+
+impl Files {
+    pub fn of(folder: &Path, binary: bool) -> Files {
+        let extension = if binary { "bin" } else { "txt" };
+        let path = |stem: &str| folder.join(format!("{stem}.{extension}"));
+        Files { binary, cameras: path("cameras"), images: path("images"), points: path("points3D") }
+    }
+
+    /// The model of a folder; binary files come first, as in COLMAP.
+    pub fn find(folder: &Path) -> Option<Files> {
+        [true, false]
+            .into_iter()
+            .map(|binary| Files::of(folder, binary))
+            .find(|files| files.cameras.is_file() && files.images.is_file())
+    }
+}
+
+/// Where a record stands.
+pub(super) struct Place<'a> {
+    pub path: &'a Path,
+    /// Counted from 1; `None` in binary files.
+    pub line: Option<usize>,
+}
+
+impl Place<'_> {
+    pub fn error(&self, problem: impl Display) -> Error {
+        Error::File { path: self.path.to_owned(), line: self.line, problem: problem.to_string() }
+    }
+}
+
+/// The calibration of one or more images.
+pub(super) struct CameraRecord {
+    pub line: Option<usize>,
+    pub id: u32,
+    pub width: u64,
+    pub height: u64,
+    /// fx, fy, cx, cy as in the file.
+    pub parameters: [f64; 4],
+}
+
+/// The camera models that are understood.
+#[derive(Clone, Copy)]
+pub(super) enum Pinhole {
+    /// f, cx, cy
+    Simple,
+    /// fx, fy, cx, cy
+    Full,
+}
+
+impl Pinhole {
+    pub fn by_name(name: &str, camera: u32, place: &Place) -> Result<Pinhole> {
+        match name {
+            "SIMPLE_PINHOLE" => Ok(Pinhole::Simple),
+            "PINHOLE" => Ok(Pinhole::Full),
+            _ => Err(place.error(format!(
+                "camera {camera} has the model {name}; expected PINHOLE or SIMPLE_PINHOLE, which photographs have \
+                 after `{UNDISTORT}`"
+            ))),
+        }
+    }
+
+    pub fn by_number(number: u32, camera: u32, place: &Place) -> Result<Pinhole> {
+        match MODELS.get(number as usize) {
+            Some(name) => Pinhole::by_name(name, camera, place),
+            None => Pinhole::by_name(&format!("number {number}"), camera, place),
+        }
+    }
+}
+
+/// An image's pose.
+pub(super) struct ImageRecord {
+    pub line: Option<usize>,
+    pub id: u32,
+    /// w, x, y, z
+    pub quaternion: [f64; 4],
+    pub translation: [f64; 3],
+    pub camera: u32,
+    pub name: String,
+}
+
+/// A point and the ids of the images that saw it.
+pub(super) struct PointRecord {
+    pub line: Option<usize>,
+    pub id: u64,
+    pub position: [f64; 3],
+    pub track: Vec<u32>,
+}
+
+/// All three files.
+pub(super) struct Records {
+    pub cameras: Vec<CameraRecord>,
+    pub images: Vec<ImageRecord>,
+    pub points: Vec<PointRecord>,
+}
+
+impl Records {
+    /// Turns ids into cameras and indices.
+    pub fn resolve(self, files: &Files) -> Result<ColmapModel> {
+        let mut cameras = HashMap::new();
+        for record in &self.cameras {
+            let place = Place { path: &files.cameras, line: record.line };
+            if cameras.insert(record.id, record.camera(&place)?).is_some() {
+                return Err(place.error(format!("camera {} occurs twice", record.id)));
+            }
+        }
+        if self.images.is_empty() {
+            return Err(Error::file(&files.images, "the model has no image; expected at least 2"));
+        }
+        let mut indices = HashMap::new();
+        let mut names = HashSet::new();
+        let mut images = Vec::new();
+        for record in self.images {
+            let place = Place { path: &files.images, line: record.line };
+            let Some(camera) = cameras.get(&record.camera) else {
+                let (id, camera) = (record.id, record.camera);
+                return Err(place.error(format!("image {id} has the camera {camera}, which the model lacks")));
+            };
+            if indices.insert(record.id, images.len() as u32).is_some() {
+                return Err(place.error(format!("image {} occurs twice", record.id)));
+            }
+            let image = record.image(camera, &place)?;
+            if !names.insert(image.name.clone()) {
+                return Err(place.error(format!("the name {} occurs twice", image.name)));
+            }
+            images.push(image);
+        }
+        let mut points = Vec::with_capacity(self.points.len());
+        for record in self.points {
+            let place = Place { path: &files.points, line: record.line };
+            let mut views = Vec::with_capacity(record.track.len());
+            for id in record.track {
+                let index = indices.get(&id).copied();
+                views.push(index.ok_or_else(|| {
+                    place.error(format!(
+                        "point {} was seen by the image {id}, which the model lacks",
+                        record.id
+                    ))
+                })?);
+            }
+            views.sort_unstable();
+            views.dedup();
+            points.push(SparsePoint { position: DVec3::from(record.position), views });
+        }
+        Ok(ColmapModel { images, points })
+    }
+}
+
+impl CameraRecord {
+    /// The camera, not placed yet.
+    fn camera(&self, place: &Place) -> Result<Camera> {
+        let side = |side: u64| u32::try_from(side).unwrap_or(u32::MAX);
+        let [fx, fy, cx, cy] = self.parameters;
+        let camera = Camera {
+            width: side(self.width),
+            height: side(self.height),
+            fx,
+            fy,
+            cx: cx - HALF_PIXEL,
+            cy: cy - HALF_PIXEL,
+            rotation: DMat3::IDENTITY,
+            translation: DVec3::ZERO,
+        };
+        camera.check(&format!("camera {}", self.id)).map_err(|error| place.error(error))?;
+        Ok(camera)
+    }
+}
+
+impl ImageRecord {
+    /// The image with its calibration and pose.
+    fn image(self, camera: &Camera, place: &Place) -> Result<ModelImage> {
+        let [w, x, y, z] = self.quaternion;
+        let quaternion = DQuat::from_xyzw(x, y, z, w);
+        let length = quaternion.length();
+        if !(length.is_finite() && length > 1e-6) {
+            let (id, values) = (self.id, self.quaternion);
+            return Err(
+                place.error(format!("image {id} has the quaternion {values:?}; expected one of length 1"))
+            );
+        }
+        check_name(&self.name).map_err(|problem| place.error(problem))?;
+        Ok(ModelImage {
+            camera: Camera {
+                rotation: DMat3::from_quat(quaternion / length),
+                translation: DVec3::from(self.translation),
+                ..*camera
+            },
+            name: self.name,
+        })
+    }
+}
+
+/// Refuses names that could make files outside the folder they belong in.
+fn check_name(name: &str) -> std::result::Result<(), String> {
+    let stays_below = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
+    if name.is_empty() || !stays_below || name.contains(char::is_control) {
+        return Err(format!(
+            "the image name is {name:?}; expected a path below the folder of images, without `..`"
+        ));
+    }
+    Ok(())
+}
+
+/// What is written, the same in text and binary. All ids count from 1.
+pub(super) struct Layout {
+    /// Distinct calibrations, unplaced.
+    pub cameras: Vec<[f64; 4]>,
+    /// Width and height of each.
+    pub sizes: Vec<[u32; 2]>,
+    pub images: Vec<ImageRecord>,
+    /// Position and point id of each image's features.
+    pub features: Vec<Vec<([f64; 2], u64)>>,
+    /// Image id and place in its features for each point.
+    pub tracks: Vec<Vec<[u32; 2]>>,
+}
+
+impl Layout {
+    pub fn of(model: &ColmapModel) -> Layout {
+        let (mut cameras, mut sizes, mut images) = (Vec::new(), Vec::new(), Vec::new());
+        for (index, ModelImage { name, camera }) in model.images.iter().enumerate() {
+            let parameters = [camera.fx, camera.fy, camera.cx + HALF_PIXEL, camera.cy + HALF_PIXEL];
+            let size = [camera.width, camera.height];
+            let known = (0..cameras.len()).find(|&i| cameras[i] == parameters && sizes[i] == size);
+            let camera_index = known.unwrap_or_else(|| {
+                cameras.push(parameters);
+                sizes.push(size);
+                cameras.len() - 1
+            });
+            let quaternion = DQuat::from_mat3(&camera.rotation);
+            images.push(ImageRecord {
+                line: None,
+                id: index as u32 + 1,
+                quaternion: [quaternion.w, quaternion.x, quaternion.y, quaternion.z],
+                translation: camera.translation.into(),
+                camera: camera_index as u32 + 1,
+                name: name.clone(),
+            });
+        }
+        let mut features = vec![Vec::new(); images.len()];
+        let track = |(index, point): (usize, &SparsePoint)| {
+            let place = |&view: &u32| {
+                let camera = &model.images[view as usize].camera;
+                let pixel = camera.project(point.position).map_or(DVec2::ZERO, |(pixel, _)| pixel);
+                let list: &mut Vec<_> = &mut features[view as usize];
+                list.push(((pixel + HALF_PIXEL).into(), index as u64 + 1));
+                [view + 1, list.len() as u32 - 1]
+            };
+            point.views.iter().map(place).collect()
+        };
+        let tracks = model.points.iter().enumerate().map(track).collect();
+        Layout { cameras, sizes, images, features, tracks }
+    }
+}

@@ -1,0 +1,132 @@
+//! Files that are written whole or not at all, and binary files whose ends are watched.
+
+use crate::error::{Error, Result};
+use std::fs::File;
+use std::io::{self, BufReader, BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
+
+/// Writes a file under a temporary name in the same folder and renames it; the folder is made when missing.
+pub(super) fn write_file(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<()>,
+) -> Result<()> {
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let attempt = || -> io::Result<()> {
+        std::fs::create_dir_all(folder)?;
+        let mut builder = tempfile::Builder::new();
+        // Temporary files are private by default; the result is a file like any other, as the umask wants it.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let mut temporary = builder.tempfile_in(folder)?;
+        let mut writer = BufWriter::new(temporary.as_file_mut());
+        write(&mut writer)?;
+        writer.flush()?;
+        drop(writer);
+        temporary.persist(path)?;
+        Ok(())
+    };
+    attempt().map_err(|error| Error::file(path, format!("cannot be written: {error}")))
+}
+
+/// A file read from start to end, which never asks for more bytes than it holds.
+pub(super) struct FileReader {
+    path: PathBuf,
+    reader: BufReader<File>,
+    remaining: u64,
+}
+
+impl FileReader {
+    pub(super) fn open(path: &Path) -> Result<FileReader> {
+        let open = || -> io::Result<(File, u64)> {
+            let file = File::open(path)?;
+            let metadata = file.metadata()?;
+            if metadata.is_dir() {
+                return Err(io::ErrorKind::IsADirectory.into());
+            }
+            Ok((file, metadata.len()))
+        };
+        let (file, remaining) = open().map_err(|error| cannot_be_read(path, error))?;
+        Ok(FileReader { path: path.to_owned(), reader: BufReader::new(file), remaining })
+    }
+
+    /// An error that names the file.
+    pub(super) fn error(&self, problem: impl std::fmt::Display) -> Error {
+        Error::file(&self.path, problem)
+    }
+
+    /// Bytes not read yet.
+    pub(super) fn remaining(&self) -> u64 {
+        self.remaining
+    }
+
+    /// Refuses the file unless it holds `count` more entries of `size` bytes; what passes fits into memory sizes.
+    pub(super) fn require(&self, count: u64, size: u64, what: &str) -> Result<()> {
+        match count.checked_mul(size) {
+            Some(bytes) if bytes <= self.remaining => Ok(()),
+            _ => {
+                let remaining = self.remaining;
+                Err(self.error(format!(
+                    "truncated: {count} x {size} bytes of {what} announced, {remaining} left"
+                )))
+            }
+        }
+    }
+
+    pub(super) fn fill(&mut self, buffer: &mut [u8], what: &str) -> Result<()> {
+        self.require(1, buffer.len() as u64, what)?;
+        self.reader.read_exact(buffer).map_err(|error| cannot_be_read(&self.path, error))?;
+        self.remaining -= buffer.len() as u64;
+        Ok(())
+    }
+
+    pub(super) fn bytes<const N: usize>(&mut self, what: &str) -> Result<[u8; N]> {
+        let mut buffer = [0; N];
+        self.fill(&mut buffer, what)?;
+        Ok(buffer)
+    }
+
+    pub(super) fn u32(&mut self, what: &str) -> Result<u32> {
+        self.bytes(what).map(u32::from_le_bytes)
+    }
+
+    pub(super) fn u64(&mut self, what: &str) -> Result<u64> {
+        self.bytes(what).map(u64::from_le_bytes)
+    }
+
+    /// Numbers that must be finite.
+    pub(super) fn f64s<const N: usize>(&mut self, what: &str) -> Result<[f64; N]> {
+        let mut values = [0.0; N];
+        for value in &mut values {
+            *value = f64::from_le_bytes(self.bytes(what)?);
+        }
+        if values.iter().all(|value| value.is_finite()) {
+            return Ok(values);
+        }
+        Err(self.error(format!("{what} is {values:?}; expected finite numbers")))
+    }
+
+    /// Passes over `count` entries of `size` bytes.
+    pub(super) fn skip(&mut self, count: u64, size: u64, what: &str) -> Result<()> {
+        self.require(count, size, what)?;
+        let bytes = count * size;
+        self.reader.seek_relative(bytes as i64).map_err(|error| cannot_be_read(&self.path, error))?;
+        self.remaining -= bytes;
+        Ok(())
+    }
+
+    /// Refuses a file that goes on.
+    pub(super) fn finish(self) -> Result<()> {
+        match self.remaining {
+            0 => Ok(()),
+            bytes => Err(self.error(format!("{bytes} bytes too many after what its counts announce"))),
+        }
+    }
+}
+
+/// The error of a file the system will not hand out.
+pub(super) fn cannot_be_read(path: &Path, error: impl std::fmt::Display) -> Error {
+    Error::file(path, format!("cannot be read: {error}"))
+}

@@ -1,0 +1,41 @@
+//! Photographs from PNG and JPEG files.
+
+use super::files::cannot_be_read;
+use crate::camera::Camera;
+use crate::error::Result;
+use crate::image::Picture;
+use image::{ColorType, DynamicImage, ImageReader, Limits};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+/// Reads a PNG or JPEG file, colour or grey, 8 or 16 bits (16 are rounded to 8). An alpha channel is dropped; nothing
+/// else is applied, neither an orientation nor a colour profile: the calibration speaks of the stored pixels.
+pub fn read_picture(path: &Path) -> Result<Picture> {
+    let image = open(path)?.decode().map_err(|error| cannot_be_read(path, error))?;
+    let (width, height) = (image.width(), image.height());
+    if is_grey(&image) {
+        return Picture::from_grey(width, height, image.into_luma8().into_raw());
+    }
+    Picture::from_rgb(width, height, image.into_rgb8().pixels().map(|pixel| pixel.0).collect())
+}
+
+/// Width and height of a PNG or JPEG file, from its header.
+pub fn picture_size(path: &Path) -> Result<(u32, u32)> {
+    open(path)?.into_dimensions().map_err(|error| cannot_be_read(path, error))
+}
+
+fn is_grey(image: &DynamicImage) -> bool {
+    matches!(image.color(), ColorType::L8 | ColorType::La8 | ColorType::L16 | ColorType::La16)
+}
+
+/// The content decides what kind of file it is, not the name.
+fn open(path: &Path) -> Result<ImageReader<BufReader<File>>> {
+    let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
+    let mut reader = reader.map_err(|error| cannot_be_read(path, error))?;
+    let mut limits = Limits::no_limits();
+    limits.max_image_width = Some(Camera::MAX_SIDE);
+    limits.max_image_height = Some(Camera::MAX_SIDE);
+    reader.limits(limits);
+    Ok(reader)
+}

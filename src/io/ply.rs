@@ -1,0 +1,172 @@
+//! Fused clouds as COLMAP and viewers read them: `fused.ply` and `fused.ply.vis`.
+
+use super::files::{FileReader, cannot_be_read, write_file};
+use crate::error::{Error, Result};
+use crate::maps::{PointCloud, PointViews};
+use ply_rs_bw::parser::{Parser, Reader};
+use ply_rs_bw::ply::{
+    ElementDef, Encoding, Header, PropertyAccess, PropertyAccessResult, PropertyDef, PropertyType, ScalarType,
+};
+use ply_rs_bw::writer::Writer;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Write};
+use std::path::Path;
+
+/// Names of the properties in the order COLMAP demands: floats, then bytes.
+const FLOATS: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
+const BYTES: [&str; 3] = ["red", "green", "blue"];
+
+/// One point as the file holds it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Vertex {
+    /// Position, then normal.
+    floats: [f32; 6],
+    colour: [u8; 3],
+}
+
+impl PropertyAccess for Vertex {
+    fn new() -> Vertex {
+        Vertex::default()
+    }
+
+    fn get_float(&self, name: &str) -> Option<f32> {
+        place(&FLOATS, name).map(|index| self.floats[index])
+    }
+
+    fn get_uchar(&self, name: &str) -> Option<u8> {
+        place(&BYTES, name).map(|index| self.colour[index])
+    }
+
+    fn set_float(&mut self, name: &str, value: f32) -> PropertyAccessResult {
+        set(place(&FLOATS, name).map(|index| &mut self.floats[index]), value)
+    }
+
+    fn set_uchar(&mut self, name: &str, value: u8) -> PropertyAccessResult {
+        set(place(&BYTES, name).map(|index| &mut self.colour[index]), value)
+    }
+}
+
+fn set<T>(property: Option<&mut T>, value: T) -> PropertyAccessResult {
+    match property {
+        Some(property) => *property = value,
+        None => return PropertyAccessResult::Ignored,
+    }
+    PropertyAccessResult::Set
+}
+
+fn place(names: &[&str], name: &str) -> Option<usize> {
+    names.iter().position(|candidate| *candidate == name)
+}
+
+/// The header of a cloud.
+fn header(points: usize) -> Header {
+    let mut vertex = ElementDef::new("vertex".to_owned());
+    vertex.count = points;
+    let floats = FLOATS.iter().map(|name| (name, ScalarType::Float));
+    let bytes = BYTES.iter().map(|name| (name, ScalarType::UChar));
+    for (name, kind) in floats.chain(bytes) {
+        let property = PropertyDef::new(name.to_string(), PropertyType::Scalar(kind));
+        vertex.properties.insert(name.to_string(), property);
+    }
+    let mut header = Header::new();
+    header.encoding = Encoding::BinaryLittleEndian;
+    header.elements.insert("vertex".to_owned(), vertex);
+    header
+}
+
+/// Writes positions (as f32, which is all the layout has), normals and colours, binary little-endian.
+pub fn write_ply(path: &Path, cloud: &PointCloud) -> Result<()> {
+    let points = cloud.positions.len();
+    for (name, length) in [("cloud.normals", cloud.normals.len()), ("cloud.colours", cloud.colours.len())] {
+        if length != points {
+            return Err(Error::argument(
+                name,
+                format!("{length} values"),
+                format!("one for each of {points} points"),
+            ));
+        }
+    }
+    let header = header(points);
+    let definition = &header.elements["vertex"];
+    let writer = Writer::<Vertex>::new();
+    write_file(path, |out| {
+        writer.write_header(out, &header)?;
+        for ((position, normal), colour) in cloud.positions.iter().zip(&cloud.normals).zip(&cloud.colours) {
+            let [x, y, z] = position.map(|coordinate| coordinate as f32);
+            let [nx, ny, nz] = *normal;
+            let vertex = Vertex { floats: [x, y, z, nx, ny, nz], colour: *colour };
+            writer.write_little_endian_element(out, &vertex, definition)?;
+        }
+        Ok(())
+    })
+}
+
+/// Reads what [`write_ply`] and COLMAP write; the points' views are in another file and left empty.
+///
+/// # Errors
+/// Not a PLY file of these properties; fewer or more points than announced.
+pub fn read_ply(path: &Path) -> Result<PointCloud> {
+    let file = File::open(path).map_err(|error| cannot_be_read(path, error))?;
+    let mut reader = Reader::new(BufReader::new(file));
+    let parser = Parser::<Vertex>::new();
+    let found = parser.read_header(&mut reader).map_err(|error| Error::file(path, error))?;
+    let count = found.elements.get("vertex").map_or(0, |vertex| vertex.count);
+    let expected = header(count);
+    if found.encoding != expected.encoding || found.elements != expected.elements {
+        let properties = format!("vertex of float {} and uchar {}", FLOATS.join(" "), BYTES.join(" "));
+        return Err(Error::file(
+            path,
+            format!("expected a binary_little_endian PLY file with one element, {properties}"),
+        ));
+    }
+    let vertices = parser
+        .read_payload_for_element(&mut reader, &found.elements["vertex"], &found)
+        .map_err(|error| Error::file(path, format!("fewer than {count} points: {error}")))?;
+    let rest = reader.get_mut().fill_buf().map_err(|error| cannot_be_read(path, error))?;
+    if !rest.is_empty() {
+        return Err(Error::file(path, format!("goes on after its {count} points")));
+    }
+    let mut cloud = PointCloud::default();
+    for Vertex { floats: [x, y, z, nx, ny, nz], colour } in vertices {
+        cloud.positions.push([x.into(), y.into(), z.into()]);
+        cloud.normals.push([nx, ny, nz]);
+        cloud.colours.push(colour);
+    }
+    Ok(cloud)
+}
+
+/// Writes the views of each point (`fused.ply.vis`): a u64 count, then for each point a u32 count and the views as u32
+/// indices into the images in the order of the model's file.
+pub fn write_visibility(path: &Path, views: &PointViews) -> Result<()> {
+    write_file(path, |out| {
+        out.write_all(&(views.len() as u64).to_le_bytes())?;
+        for point in 0..views.len() {
+            let views = views.get(point);
+            out.write_all(&(views.len() as u32).to_le_bytes())?;
+            for view in views {
+                out.write_all(&view.to_le_bytes())?;
+            }
+        }
+        Ok(())
+    })
+}
+
+/// Reads what [`write_visibility`] writes.
+pub fn read_visibility(path: &Path) -> Result<PointViews> {
+    let mut file = FileReader::open(path)?;
+    let points = file.u64("the number of points")?;
+    file.require(points, 4, "points")?;
+    let mut all = PointViews::default();
+    let mut views = Vec::new();
+    for _ in 0..points {
+        let count = file.u32("a point's number of views")?;
+        file.require(count.into(), 4, "a point's views")?;
+        views.clear();
+        for _ in 0..count {
+            views.push(file.u32("a point's views")?);
+        }
+        all.push(&views);
+    }
+    file.finish()?;
+    Ok(all)
+}

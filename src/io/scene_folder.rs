@@ -1,0 +1,76 @@
+//! Scenes from a folder with `images/` and `sparse/` or `sparse/0/`, as COLMAP's image_undistorter writes it.
+
+use super::colmap_model::ColmapModel;
+use super::pictures::{picture_size, read_picture};
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+use crate::image::Picture;
+use crate::scene::{DepthRange, Scene, View};
+use std::path::{Path, PathBuf};
+
+/// Where a scene's photographs and model lie.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SceneFolder {
+    /// The folder the names of the model's images are relative to.
+    pub images: PathBuf,
+    /// The folder of the model.
+    pub sparse: PathBuf,
+}
+
+impl SceneFolder {
+    /// Finds the model in `sparse/`, else in `sparse/0/`. Whether `images/` is there is not asked yet.
+    pub fn find(folder: &Path) -> Result<SceneFolder> {
+        if !folder.is_dir() {
+            return Err(Error::file(folder, "no such folder; expected one with images/ and sparse/"));
+        }
+        let places = [folder.join("sparse"), folder.join("sparse").join("0")];
+        match places.into_iter().find(|place| ColmapModel::is_in(place)) {
+            Some(sparse) => Ok(SceneFolder { images: folder.join("images"), sparse }),
+            None => Err(Error::file(
+                folder,
+                "no COLMAP model; expected cameras.bin and images.bin, or cameras.txt and images.txt, in sparse/ or \
+                 sparse/0/",
+            )),
+        }
+    }
+
+    /// Reads the photograph of one image of the model.
+    ///
+    /// # Errors
+    /// A missing or damaged file; another size than the camera's.
+    pub fn read_picture(&self, name: &str, camera: &Camera) -> Result<Picture> {
+        let path = self.images.join(name);
+        if !path.is_file() {
+            let sparse = self.sparse.display();
+            return Err(Error::file(
+                &path,
+                format!("missing; the model in {sparse} has an image of this name"),
+            ));
+        }
+        let (width, height) = picture_size(&path)?;
+        if (width, height) != (camera.width, camera.height) {
+            let expected = format!("{}x{}, the size of its camera in the model", camera.width, camera.height);
+            return Err(Error::file(&path, format!("the picture is {width}x{height}; expected {expected}")));
+        }
+        read_picture(&path)
+    }
+}
+
+/// Reads a scene; `depth_range` holds for every view and is needed where the model has no points.
+///
+/// # Errors
+/// What is missing from the folder; what [`ColmapModel::read`], [`SceneFolder::read_picture`] and [`Scene::new`]
+/// refuse.
+pub fn read_scene(folder: &Path, depth_range: Option<DepthRange>) -> Result<Scene> {
+    let scene = SceneFolder::find(folder)?;
+    if !scene.images.is_dir() {
+        return Err(Error::file(&scene.images, "no such folder; expected the photographs in it"));
+    }
+    let model = ColmapModel::read(&scene.sparse)?;
+    let view = |image: super::ModelImage| {
+        let picture = scene.read_picture(&image.name, &image.camera)?;
+        Ok(View { name: image.name, picture, camera: image.camera, mask: None, depth_range })
+    };
+    let views = model.images.into_iter().map(view).collect::<Result<_>>()?;
+    Scene::new(views, model.points)
+}

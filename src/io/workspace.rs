@@ -1,0 +1,232 @@
+//! The dense folder: maps, consistency graphs, previews and the fused cloud, laid out as COLMAP does.
+
+use super::colmap_maps::{
+    Grid, read_depth_map, read_normal_map, write_consistency_graph, write_depth_map, write_normal_map,
+};
+use super::colmap_model::ColmapModel;
+use super::files::cannot_be_read;
+use super::ply::{write_ply, write_visibility};
+use super::previews::{write_depth_preview, write_normal_preview, write_views_preview};
+use super::scene_folder::SceneFolder;
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+use crate::image::Picture;
+use crate::maps::{Maps, PointCloud, ViewResult};
+use crate::scene::SparsePoint;
+use std::path::{Path, PathBuf};
+
+/// Which of a view's maps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MapKind {
+    /// The raw estimate.
+    Photometric,
+    /// What was validated by other views.
+    Geometric,
+}
+
+impl MapKind {
+    /// Its name in file names.
+    pub fn name(self) -> &'static str {
+        match self {
+            MapKind::Photometric => "photometric",
+            MapKind::Geometric => "geometric",
+        }
+    }
+}
+
+/// A dense folder. Views are called by their names in the model, which may contain folders.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Workspace {
+    folder: PathBuf,
+}
+
+impl Workspace {
+    /// The dense folder of this path; nothing is read or made yet.
+    pub fn new(folder: impl Into<PathBuf>) -> Workspace {
+        Workspace { folder: folder.into() }
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// `stereo/depth_maps/NAME.KIND.bin`
+    pub fn depth_map(&self, name: &str, kind: MapKind) -> PathBuf {
+        self.map("depth_maps", name, kind)
+    }
+
+    /// `stereo/normal_maps/NAME.KIND.bin`
+    pub fn normal_map(&self, name: &str, kind: MapKind) -> PathBuf {
+        self.map("normal_maps", name, kind)
+    }
+
+    /// `stereo/consistency_graphs/NAME.KIND.bin`
+    pub fn consistency_graph(&self, name: &str, kind: MapKind) -> PathBuf {
+        self.map("consistency_graphs", name, kind)
+    }
+
+    /// `preview/NAME.WHAT.png`, `what` being `depth`, `normal` or `views`.
+    pub fn preview(&self, name: &str, what: &str) -> PathBuf {
+        self.folder.join("preview").join(format!("{name}.{what}.png"))
+    }
+
+    /// `fused.ply`
+    pub fn cloud(&self) -> PathBuf {
+        self.folder.join("fused.ply")
+    }
+
+    fn map(&self, what: &str, name: &str, kind: MapKind) -> PathBuf {
+        self.folder.join("stereo").join(what).join(format!("{name}.{}.bin", kind.name()))
+    }
+
+    /// Writes all files of one view: depth and normal map and consistency graph of the raw estimate (photometric) and
+    /// of what was validated (geometric), and previews of the latter.
+    pub fn write_view(&self, name: &str, camera: &Camera, result: &ViewResult) -> Result<()> {
+        let filtered = result.filtered();
+        self.write_maps(name, MapKind::Photometric, camera, &result.estimate, result)?;
+        self.write_maps(name, MapKind::Geometric, camera, &filtered, result)?;
+        let (width, height) = (camera.width, camera.height);
+        write_depth_preview(&self.preview(name, "depth"), width, height, &filtered.depth)?;
+        write_normal_preview(&self.preview(name, "normal"), width, height, &filtered.normal)?;
+        write_views_preview(&self.preview(name, "views"), width, height, result.sources.len(), |pixel| {
+            if filtered.depth[pixel] > 0.0 { result.view_sets.count(pixel) } else { 0 }
+        })
+    }
+
+    fn write_maps(
+        &self,
+        name: &str,
+        kind: MapKind,
+        camera: &Camera,
+        maps: &Maps,
+        result: &ViewResult,
+    ) -> Result<()> {
+        let (width, height) = (camera.width, camera.height);
+        write_depth_map(&self.depth_map(name, kind), width, height, &maps.depth)?;
+        write_normal_map(&self.normal_map(name, kind), width, height, &maps.normal)?;
+        write_consistency_graph(&self.consistency_graph(name, kind), width, height, |pixel| {
+            let estimated = maps.depth[pixel] > 0.0;
+            let sources = result.view_sets.iter(pixel).filter(move |_| estimated);
+            sources.map(|source| result.sources[source])
+        })
+    }
+
+    /// Writes `fused.ply` and `fused.ply.vis`, or another PLY file and its `.vis` beside it.
+    pub fn write_cloud(path: &Path, cloud: &PointCloud) -> Result<()> {
+        write_ply(path, cloud)?;
+        let mut visibility = path.as_os_str().to_owned();
+        visibility.push(".vis");
+        write_visibility(Path::new(&visibility), &cloud.views)
+    }
+
+    /// Reads depth and normal map of one view.
+    ///
+    /// # Errors
+    /// A missing or damaged file; another size than the camera's; a depth without a unit normal.
+    pub fn read_maps(&self, name: &str, kind: MapKind, camera: &Camera) -> Result<Maps> {
+        let depth_path = self.depth_map(name, kind);
+        let normal_path = self.normal_map(name, kind);
+        let depth = sized(&depth_path, camera, read_depth_map(&depth_path)?)?;
+        let mut normal = sized(&normal_path, camera, read_normal_map(&normal_path)?)?;
+        for (pixel, (depth, normal)) in depth.iter().zip(&mut normal).enumerate() {
+            if *depth == 0.0 {
+                *normal = [0.0; 3];
+                continue;
+            }
+            let length = normal.iter().map(|component| component * component).sum::<f32>().sqrt();
+            if (length - 1.0).abs() > 0.01 {
+                let (column, row) = (pixel % camera.width as usize, pixel / camera.width as usize);
+                let place = format!("the normal at column {column}, row {row}");
+                return Err(Error::file(
+                    &normal_path,
+                    format!("{place} has the length {length}; expected 1"),
+                ));
+            }
+        }
+        Ok(Maps { depth, normal })
+    }
+
+    /// The scene the workspace belongs to: its own `sparse/` (and `images/`), as COLMAP's workspaces have them, else
+    /// those of the folder above it.
+    pub fn find_scene(&self) -> Result<SceneFolder> {
+        let folder = self.folder.canonicalize().map_err(|error| cannot_be_read(&self.folder, error))?;
+        SceneFolder::find(&folder).or_else(|own| match folder.parent() {
+            Some(parent) => SceneFolder::find(parent).map_err(|_| {
+                let expected = "sparse/ with cameras.bin and images.bin, or cameras.txt and images.txt";
+                Error::file(
+                    &folder,
+                    format!("no COLMAP model here or in the folder above; expected {expected}"),
+                )
+            }),
+            None => Err(own),
+        })
+    }
+
+    /// Reads the maps of all views of the scene, with cameras, pictures and points: the geometric maps when any view
+    /// has one, else the photometric ones, never a mixture.
+    ///
+    /// # Errors
+    /// No view with maps; a map without its other half, damaged or of another size than its camera; a damaged picture.
+    pub fn read(&self, scene: &SceneFolder) -> Result<WorkspaceMaps> {
+        let ColmapModel { images, points } = ColmapModel::read(&scene.sparse)?;
+        let kinds = [MapKind::Geometric, MapKind::Photometric];
+        let has_map = |name: &str, kind| self.depth_map(name, kind).is_file();
+        let Some(kind) =
+            kinds.into_iter().find(|&kind| images.iter().any(|image| has_map(&image.name, kind)))
+        else {
+            let wanted = format!("stereo/depth_maps/{}.geometric.bin or .photometric.bin", images[0].name);
+            return Err(Error::file(&self.folder, format!("no depth maps; expected files like {wanted}")));
+        };
+        let mut missing = Vec::new();
+        let mut views = Vec::new();
+        for image in images {
+            let maps = if has_map(&image.name, kind) {
+                self.read_maps(&image.name, kind, &image.camera)?
+            } else {
+                missing.push(image.name.clone());
+                let pixels = image.camera.pixels();
+                Maps { depth: vec![0.0; pixels], normal: vec![[0.0; 3]; pixels] }
+            };
+            let has_picture = scene.images.join(&image.name).is_file();
+            let picture = has_picture.then(|| scene.read_picture(&image.name, &image.camera)).transpose()?;
+            views.push(WorkspaceView { name: image.name, camera: image.camera, maps, picture });
+        }
+        Ok(WorkspaceMaps { views, points, kind, missing })
+    }
+}
+
+/// A view of a workspace.
+#[derive(Debug, Clone)]
+pub struct WorkspaceView {
+    /// Its name in the model.
+    pub name: String,
+    /// Its camera.
+    pub camera: Camera,
+    /// Its maps, of the camera's size; all zeros when there are none.
+    pub maps: Maps,
+    /// Its photograph, when the file is there.
+    pub picture: Option<Picture>,
+}
+
+/// What a workspace holds for fusion.
+#[derive(Debug, Clone)]
+pub struct WorkspaceMaps {
+    /// All views of the model in the order of its file.
+    pub views: Vec<WorkspaceView>,
+    /// The model's points.
+    pub points: Vec<SparsePoint>,
+    /// Which maps were read.
+    pub kind: MapKind,
+    /// Names of the views without maps.
+    pub missing: Vec<String>,
+}
+
+/// The values of a map of the camera's size.
+fn sized<T>(path: &Path, camera: &Camera, grid: Grid<T>) -> Result<Vec<T>> {
+    if (grid.width, grid.height) == (camera.width, camera.height) {
+        return Ok(grid.values);
+    }
+    let expected = format!("{}x{}, the size of its camera", camera.width, camera.height);
+    Err(Error::file(path, format!("the map is {}x{}; expected {expected}", grid.width, grid.height)))
+}

@@ -1,0 +1,147 @@
+//! The dense folder, written and read back.
+
+use crate::scene_folder::write_pictures;
+use crate::{assert_refused, camera, model};
+use skep::io::{
+    MapKind, SceneFolder, Workspace, read_consistency_graph, read_ply, read_visibility, write_depth_map,
+    write_normal_map,
+};
+use skep::views::ViewSets;
+use skep::{Counts, Maps, Outcome, PointCloud, PointViews, ViewResult};
+use std::path::Path;
+use tempfile::{TempDir, tempdir};
+
+/// A result of 6 x 4 pixels: pixel 3 is validated, pixel 4 inconsistent, the others masked. Its sources are the views
+/// 5 and 2 of the scene, both used by pixel 3, the second by pixel 4.
+fn result() -> ViewResult {
+    let mut result = ViewResult {
+        estimate: Maps { depth: vec![0.0; 24], normal: vec![[0.0; 3]; 24] },
+        cost: vec![0.0; 24],
+        outcome: vec![Outcome::Masked; 24],
+        sources: vec![5, 2],
+        view_sets: ViewSets::empty(24, 2),
+        counts: Counts::default(),
+        cycles: vec![],
+    };
+    for (pixel, outcome) in [(3, Outcome::Validated), (4, Outcome::Inconsistent)] {
+        result.estimate.depth[pixel] = pixel as f32;
+        result.estimate.normal[pixel] = [0.0, 0.6, -0.8];
+        result.outcome[pixel] = outcome;
+        result.view_sets.insert(pixel, 1);
+    }
+    result.view_sets.insert(3, 0);
+    result
+}
+
+/// A scene with a dense folder in it.
+fn scene() -> (TempDir, Workspace) {
+    let folder = tempdir().unwrap();
+    model().write_text(&folder.path().join("sparse")).unwrap();
+    write_pictures(folder.path(), &model());
+    let workspace = Workspace::new(folder.path().join("dense"));
+    std::fs::create_dir(workspace.folder()).unwrap();
+    (folder, workspace)
+}
+
+const NAME: &str = "cam 1/right side.png";
+
+#[test]
+fn a_view_is_written_as_colmap_lays_it_out() {
+    let (_folder, workspace) = scene();
+    workspace.write_view(NAME, &camera(0.0), &result()).unwrap();
+    for file in [
+        "stereo/depth_maps/cam 1/right side.png.photometric.bin",
+        "stereo/normal_maps/cam 1/right side.png.geometric.bin",
+        "stereo/consistency_graphs/cam 1/right side.png.geometric.bin",
+        "preview/cam 1/right side.png.depth.png",
+        "preview/cam 1/right side.png.normal.png",
+        "preview/cam 1/right side.png.views.png",
+    ] {
+        assert!(workspace.folder().join(file).is_file(), "{file}");
+    }
+    let raw = workspace.read_maps(NAME, MapKind::Photometric, &camera(0.0)).unwrap();
+    assert_eq!(raw, result().estimate);
+    let validated = workspace.read_maps(NAME, MapKind::Geometric, &camera(0.0)).unwrap();
+    assert_eq!(validated, result().filtered());
+    assert_eq!((validated.depth[3], validated.depth[4]), (3.0, 0.0));
+}
+
+#[test]
+fn consistency_graphs_name_the_views_of_the_scene() {
+    let (_folder, workspace) = scene();
+    workspace.write_view(NAME, &camera(0.0), &result()).unwrap();
+    let graph = |kind| read_consistency_graph(&workspace.consistency_graph(NAME, kind)).unwrap();
+    let raw = graph(MapKind::Photometric);
+    assert_eq!(raw.pixels, [[3, 0], [4, 0]]);
+    assert_eq!((raw.views.get(0), raw.views.get(1)), ([5, 2].as_slice(), [2].as_slice()));
+    assert_eq!(graph(MapKind::Geometric).pixels, [[3, 0]], "only what was validated");
+}
+
+#[test]
+fn a_cloud_is_written_with_its_visibility_beside_it() {
+    let (_folder, workspace) = scene();
+    let mut views = PointViews::default();
+    views.push(&[1, 0]);
+    let cloud = PointCloud {
+        positions: vec![[1.0, 2.0, 3.0]],
+        normals: vec![[0.0, 0.0, 1.0]],
+        colours: vec![[1, 2, 3]],
+        views: views.clone(),
+    };
+    Workspace::write_cloud(&workspace.cloud(), &cloud).unwrap();
+    assert_eq!(read_ply(&workspace.folder().join("fused.ply")).unwrap().positions, cloud.positions);
+    assert_eq!(read_visibility(&workspace.folder().join("fused.ply.vis")).unwrap(), views);
+}
+
+#[test]
+fn maps_that_do_not_fit_are_refused() {
+    let (_folder, workspace) = scene();
+    let read = |camera| workspace.read_maps("a.png", MapKind::Geometric, &camera);
+    assert_refused(read(camera(0.0)), &["depth_maps", "a.png.geometric.bin", "cannot be read"]);
+    let (depth, normal) =
+        (workspace.depth_map("a.png", MapKind::Geometric), workspace.normal_map("a.png", MapKind::Geometric));
+    write_depth_map(&depth, 6, 4, &[1.0; 24]).unwrap();
+    assert_refused(read(camera(0.0)), &["normal_maps", "cannot be read"]);
+    write_normal_map(&normal, 4, 6, &[[0.0, 0.0, -1.0]; 24]).unwrap();
+    assert_refused(read(camera(0.0)), &["normal_maps", "4x6", "6x4"]);
+    write_normal_map(&normal, 6, 4, &[[0.0, 0.0, -1.5]; 24]).unwrap();
+    assert_refused(read(camera(0.0)), &["column 0, row 0", "length 1.5"]);
+    write_depth_map(&depth, 6, 4, &[0.0; 24]).unwrap();
+    assert_eq!(read(camera(0.0)).unwrap().normal, [[0.0; 3]; 24], "no depth, no normal");
+}
+
+#[test]
+fn a_workspace_finds_its_own_scene_or_the_one_above() {
+    let (folder, workspace) = scene();
+    let above = folder.path().canonicalize().unwrap();
+    assert_eq!(workspace.find_scene().unwrap(), SceneFolder::find(&above).unwrap());
+    model().write_binary(&workspace.folder().join("sparse")).unwrap();
+    assert_eq!(workspace.find_scene().unwrap(), SceneFolder::find(&above.join("dense")).unwrap());
+    let (lost, none) = (folder.path().join("images/cam 1"), Path::new("no such workspace"));
+    assert_refused(Workspace::new(lost).find_scene(), &["cam 1", "folder above", "sparse/"]);
+    assert_refused(Workspace::new(none).find_scene(), &["no such workspace"]);
+}
+
+#[test]
+fn all_maps_of_a_workspace_are_read_and_missing_ones_named() {
+    let (folder, workspace) = scene();
+    let found = workspace.find_scene().unwrap();
+    assert_refused(workspace.read(&found), &["no depth maps", "left.png.geometric.bin"]);
+
+    workspace.write_view(NAME, &camera(0.5), &result()).unwrap();
+    std::fs::remove_file(folder.path().join("images/left.png")).unwrap();
+    let maps = workspace.read(&found).unwrap();
+    assert_eq!(
+        (maps.kind, maps.missing.as_slice()),
+        (MapKind::Geometric, ["left.png".to_owned()].as_slice())
+    );
+    assert_eq!(maps.views[0].maps.depth, [0.0; 24], "views keep their places in the file");
+    assert!(maps.views[0].picture.is_none());
+    assert_eq!(maps.views[1].maps, result().filtered());
+    assert_eq!(maps.views[1].picture.as_ref().unwrap().rgb(0), [1, 50, 60]);
+    assert_eq!(maps.points.len(), 3);
+
+    std::fs::remove_file(workspace.depth_map(NAME, MapKind::Geometric)).unwrap();
+    let maps = workspace.read(&found).unwrap();
+    assert_eq!((maps.kind, &maps.views[1].maps), (MapKind::Photometric, &result().estimate));
+}
