@@ -130,9 +130,10 @@ fn reasons(totals: &Totals) -> Vec<String> {
         Outcome::Inconsistent => "other views disagree: check the calibration and that nothing moved",
         Outcome::OutOfRange => "at an end of the depth range: try --depth-range MIN MAX with a wider one",
     };
-    let mut lines = vec!["the cloud is empty because of all pixels".to_owned()];
+    let mut lines = vec!["the cloud is empty; what became of the pixels:".to_owned()];
     for outcome in Outcome::ALL.into_iter().filter(|outcome| totals.outcomes[outcome.name()] > 0) {
-        lines.push(format!("  {:5.1} % {}: {}", share(totals, outcome), outcome.name(), help(outcome)));
+        let (name, share) = (outcome.name(), share(totals, outcome));
+        lines.push(format!("  {} ({share:.1} %) {name}: {}", totals.outcomes[name], help(outcome)));
     }
     lines
 }
@@ -140,4 +141,19 @@ fn reasons(totals: &Totals) -> Vec<String> {
 /// Percentage of the pixels with this outcome.
 fn share(totals: &Totals, outcome: Outcome) -> f64 {
     totals.outcomes[outcome.name()] as f64 * 100.0 / totals.pixels.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_empty_cloud_is_explained_by_the_reasons_that_occurred() {
+        let counts = [0, 0, 300, 0, 700, 0];
+        let outcomes = Outcome::ALL.iter().map(|outcome| outcome.name()).zip(counts).collect();
+        let lines = reasons(&Totals { pixels: 1000, outcomes, ..Totals::default() });
+        assert_eq!(lines.len(), 3, "{lines:?}");
+        assert!(lines[1].starts_with("  300 (30.0 %) no_texture: "), "{}", lines[1]);
+        assert!(lines[2].starts_with("  700 (70.0 %) inconsistent: "), "{}", lines[2]);
+    }
 }

@@ -24,18 +24,18 @@ pub struct Report {
 }
 
 /// The whole run.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 pub struct Totals {
     pub pixels: u64,
     pub outcomes: BTreeMap<&'static str, u64>,
-    ncc_evaluations: u64,
-    samples: u64,
-    early_outs: u64,
-    cycles: Vec<CycleReport>,
+    pub ncc_evaluations: u64,
+    pub samples: u64,
+    pub early_outs: u64,
+    pub cycles: Vec<CycleReport>,
     pub points: usize,
     pub wall_seconds: f64,
-    cpu_seconds: f64,
-    peak_resident_bytes: Option<u64>,
+    pub cpu_seconds: f64,
+    pub peak_resident_bytes: Option<u64>,
 }
 
 #[derive(Serialize)]
@@ -56,7 +56,7 @@ struct ViewReport {
 
 /// A cycle of one view, or of all views together.
 #[derive(Serialize)]
-struct CycleReport {
+pub struct CycleReport {
     reduction: u32,
     cycle: u32,
     pixels: u64,
