@@ -29,3 +29,8 @@ pub use options::{Aggregation, FusionOptions, Options, Scale};
 pub use progress::{Hook, Phase, Progress, ignore_progress};
 pub use scene::{DepthRange, Scene, SparsePoint, View};
 pub use solve::reconstruct;
+
+/// Compiles the example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -17,6 +17,7 @@ pub use colmap_maps::{
     write_depth_map, write_normal_map,
 };
 pub use colmap_model::{ColmapModel, ModelImage};
+pub use files::write_file;
 pub use pictures::{picture_size, read_picture};
 pub use ply::{read_ply, read_visibility, write_ply, write_visibility};
 pub use previews::{write_depth_preview, write_normal_preview, write_views_preview};

@@ -1,0 +1,158 @@
+//! The words of the command line and the help that teaches them.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use skep::{DepthRange, Options, Result};
+use std::path::PathBuf;
+
+#[derive(Parser)]
+#[command(name = "skep", version, about, after_help = EXAMPLES, arg_required_else_help = true)]
+pub struct Arguments {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Subcommand)]
+pub enum Command {
+    /// Estimate depth, normal and source-view maps of a scene and fuse them into a cloud
+    #[command(after_help = RECONSTRUCT_HELP)]
+    Reconstruct(Reconstruct),
+    /// Fuse depth and normal maps that are already there, from skep or from COLMAP
+    #[command(after_help = FUSE_HELP)]
+    Fuse(Fuse),
+    /// Show version, instruction set, threads and every option of the presets
+    Info,
+}
+
+#[derive(Args)]
+pub struct Reconstruct {
+    /// Folder with images/ and a COLMAP model in sparse/ or sparse/0/
+    pub scene: PathBuf,
+    /// Where the results go [default: SCENE/dense]
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// default measures best; paper follows the paper to the letter and takes its time
+    #[arg(long, default_value = "default", value_parser = Options::PRESETS)]
+    pub preset: String,
+    /// Worker threads; 0 takes one for each core. The result does not depend on it
+    #[arg(short, long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// Seed of the random generator; the same seed gives the same result
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Depths to search in every view, in the model's units, instead of those of the sparse points
+    #[arg(long, num_args = 2, value_names = ["MIN", "MAX"], allow_negative_numbers = true)]
+    depth_range: Option<Vec<f64>>,
+    /// Leave parts of the method out, separated by commas
+    #[arg(long, value_name = "PARTS", value_delimiter = ',')]
+    without: Vec<Part>,
+    /// Print warnings and errors only
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// A part of the method that can be left out.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Part {
+    /// Incidence and visibility do not refine the view set of a pixel
+    ViewSelection,
+    /// Planes of validated neighbours are not favoured
+    Reward,
+    /// Consistent solutions are not offered to other views
+    Propagation,
+}
+
+#[derive(Args)]
+pub struct Fuse {
+    /// Folder that holds stereo/depth_maps and stereo/normal_maps
+    pub workspace: PathBuf,
+    /// Where the cloud goes [default: WORKSPACE/fused.ply]
+    #[arg(short, long, value_name = "FILE.ply")]
+    output: Option<PathBuf>,
+    /// Print warnings and errors only
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+impl Reconstruct {
+    /// The folder of the results.
+    pub fn output(&self) -> PathBuf {
+        self.output.clone().unwrap_or_else(|| self.scene.join("dense"))
+    }
+
+    /// The preset with what the other arguments change in it.
+    pub fn options(&self) -> Result<Options> {
+        let mut options = Options::preset(&self.preset)?;
+        options.threads = self.threads;
+        options.seed = self.seed;
+        for part in &self.without {
+            match part {
+                Part::ViewSelection => options.view_selection = false,
+                Part::Reward => options.reward = 0.0,
+                Part::Propagation => options.propagation = false,
+            }
+        }
+        Ok(options)
+    }
+
+    /// The depth range given by hand.
+    pub fn depth_range(&self) -> Result<Option<DepthRange>> {
+        let Some(&[near, far]) = self.depth_range.as_deref() else { return Ok(None) };
+        let range = DepthRange { near, far };
+        range.check("--depth-range")?;
+        Ok(Some(range))
+    }
+}
+
+impl Fuse {
+    /// The file of the cloud.
+    pub fn output(&self) -> PathBuf {
+        self.output.clone().unwrap_or_else(|| self.workspace.join("fused.ply"))
+    }
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  skep reconstruct SCENE            maps and cloud of a scene, into SCENE/dense
+  skep fuse SCENE/dense             the cloud again, from the maps that are there
+  skep help reconstruct             what the files are, and what to do when it fails
+
+Exit status: 0 done, 1 failed, 2 wrong arguments, 130 interrupted (Ctrl-C).";
+
+const RECONSTRUCT_HELP: &str = "\
+The scene:
+  images/              photographs, PNG or JPEG, colour or grey
+  sparse/, sparse/0/   COLMAP model, text or binary, cameras PINHOLE or SIMPLE_PINHOLE
+  This is what `colmap image_undistorter` writes; run it first when lenses distort:
+    colmap image_undistorter --image_path IMAGES --input_path MODEL --output_path SCENE
+
+What it makes, in COLMAP's layouts:
+  fused.ply                        the cloud: position, normal, colour
+  fused.ply.vis                    the views each point was seen in
+  preview/NAME.depth.png           pictures to look at first: depth, normal and number of
+          NAME.normal.png          source views of each pixel; black where nothing was found
+          NAME.views.png
+  stereo/depth_maps/NAME.photometric.bin    the raw estimate of every pixel
+  stereo/depth_maps/NAME.geometric.bin      only what other views confirm
+  stereo/normal_maps, stereo/consistency_graphs    likewise: normals, and source views of each pixel
+  report.json                      counts, times and options; written last
+
+Examples:
+  skep reconstruct SCENE --output RESULT --threads 4
+  skep reconstruct SCENE --depth-range 0.5 12
+  skep reconstruct SCENE --preset paper --without reward,propagation
+
+When it fails:
+  no sparse points: give --depth-range MIN MAX, or triangulate points:
+    colmap point_triangulator --database_path DATABASE --image_path IMAGES \\
+      --input_path MODEL --output_path SCENE/sparse
+  an empty or thin cloud: the last lines say why pixels were dropped, report.json says it for each
+    view; preview/NAME.views.png shows where too few views see the surface.";
+
+const FUSE_HELP: &str = "\
+The workspace is what `skep reconstruct` or `colmap patch_match_stereo` leaves: stereo/depth_maps and
+stereo/normal_maps. The scene it was made from, images/ and sparse/, is looked for in WORKSPACE and in
+the folder above it. FILE.ply.vis, the views of each point, is written beside FILE.ply.
+
+Examples:
+  skep fuse SCENE/dense
+  skep fuse SCENE/dense --output cloud.ply";

@@ -1,0 +1,110 @@
+//! `skep fuse`: the cloud from maps that are already there.
+
+use crate::arguments::Fuse;
+use crate::interrupt::Interrupt;
+use crate::progress::Display;
+use crate::{Failure, streams};
+use skep::fusion::{FusionView, fuse};
+use skep::io::{Workspace, WorkspaceMaps};
+use skep::{Error, Options, PointCloud, Progress, SparsePoint};
+use std::collections::BTreeSet;
+
+/// Runs the command.
+pub fn run(arguments: &Fuse) -> Result<(), Failure> {
+    let display = Display::new(arguments.quiet);
+    display.say(&format!("reading {}", arguments.workspace.display()));
+    let workspace = Workspace::new(&arguments.workspace);
+    let maps = workspace.read(&workspace.find_scene()?)?;
+    if !maps.missing.is_empty() {
+        let missing = maps.missing.join(", ");
+        streams::warning(&format!(
+            "{} views have no {} maps: {missing}",
+            maps.missing.len(),
+            maps.kind.name()
+        ));
+    }
+
+    let interrupt = Interrupt::watch();
+    let output = arguments.output();
+    let cloud = fuse_maps(&maps, display, &interrupt).inspect_err(|error| {
+        if *error == Error::Cancelled {
+            streams::notice(&format!("interrupted: {} is as it was", output.display()));
+        }
+    })?;
+    Workspace::write_cloud(&output, &cloud)?;
+
+    if !arguments.quiet {
+        summary(&maps, &cloud).iter().for_each(|line| streams::result(line));
+        streams::result(&format!("{} points in {}", cloud.positions.len(), output.display()));
+    }
+    Ok(())
+}
+
+fn fuse_maps(maps: &WorkspaceMaps, display: Display, interrupt: &Interrupt) -> skep::Result<PointCloud> {
+    let overlaps = overlaps(maps.views.len(), &maps.points);
+    let views: Vec<FusionView> = maps
+        .views
+        .iter()
+        .zip(&overlaps)
+        .map(|(view, overlap)| FusionView {
+            camera: &view.camera,
+            maps: &view.maps,
+            picture: view.picture.as_ref(),
+            overlap,
+        })
+        .collect();
+    let follower = display.follow();
+    let hook = |progress: &Progress| {
+        follower.show(progress);
+        interrupt.control_flow()
+    };
+    let cloud = fuse(&views, &Options::default().fusion, &hook)?;
+    interrupt.check().map(|()| cloud)
+}
+
+/// For each view those that share a sparse point with it; all others where no point tells.
+fn overlaps(views: usize, points: &[SparsePoint]) -> Vec<Vec<u32>> {
+    let mut overlaps = vec![BTreeSet::new(); views];
+    for point in points {
+        for &view in &point.views {
+            let others = point.views.iter().filter(|&&other| other != view);
+            overlaps[view as usize].extend(others);
+        }
+    }
+    let all_others = |view: usize| (0..views as u32).filter(move |&other| other as usize != view);
+    let list = |(view, overlap): (usize, BTreeSet<u32>)| match overlap.is_empty() {
+        true => all_others(view).collect(),
+        false => overlap.into_iter().collect(),
+    };
+    overlaps.into_iter().enumerate().map(list).collect()
+}
+
+/// What was fused and, when the cloud is empty, what may be the reason.
+fn summary(maps: &WorkspaceMaps, cloud: &PointCloud) -> Vec<String> {
+    let pixels: usize = maps.views.iter().map(|view| view.maps.depth.len()).sum();
+    let depths =
+        |view: &skep::io::WorkspaceView| view.maps.depth.iter().filter(|&&depth| depth > 0.0).count();
+    let estimated: usize = maps.views.iter().map(depths).sum();
+    let kind = maps.kind.name();
+    let mut lines = vec![format!("{estimated} depths of {pixels} pixels in the {kind} maps")];
+    if cloud.positions.is_empty() {
+        let others = Options::default().fusion.min_views;
+        lines.push(match estimated {
+            0 => "the cloud is empty because no map holds a depth".to_owned(),
+            _ => format!("the cloud is empty because no depth is confirmed by {others} other views"),
+        });
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn views_overlap_when_they_share_a_point_and_with_all_when_no_point_tells() {
+        let point = |views: &[u32]| SparsePoint { position: Default::default(), views: views.to_vec() };
+        let overlaps = overlaps(4, &[point(&[0, 2]), point(&[2, 3, 0])]);
+        assert_eq!(overlaps, [vec![2, 3], vec![0, 2, 3], vec![0, 3], vec![0, 2]]);
+    }
+}

@@ -1,0 +1,171 @@
+//! How a run shows where it stands: a bar on a terminal, plain lines elsewhere, on standard error.
+
+use crate::streams;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use skep::{Phase, Progress};
+use std::io::IsTerminal;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+/// Steps of the bar; finer ones could not be seen.
+const BAR_STEPS: f64 = 1000.0;
+/// Share of the run under which the time that is left would be a guess.
+const FIRST_ESTIMATE: f64 = 0.01;
+
+/// The style that suits whoever watches.
+#[derive(Clone, Copy)]
+pub enum Display {
+    Silent,
+    Lines,
+    Bar,
+}
+
+/// Shows the progress of one piece of work; its bar goes when it is dropped, its lines stay.
+pub struct Follower {
+    display: Display,
+    bar: ProgressBar,
+    started: Instant,
+    last: Mutex<Option<Shown>>,
+}
+
+/// What was shown last: nothing is drawn again unless it changed.
+#[derive(Clone, Copy, PartialEq)]
+struct Shown {
+    step: (Phase, u32, u32),
+    view: usize,
+    bar_steps: u64,
+}
+
+impl Display {
+    /// A bar on a terminal, lines elsewhere, nothing at all when `quiet`.
+    pub fn new(quiet: bool) -> Display {
+        match (quiet, std::io::stderr().is_terminal()) {
+            (true, _) => Display::Silent,
+            (false, false) => Display::Lines,
+            (false, true) => Display::Bar,
+        }
+    }
+
+    /// A line about what is not followed step by step.
+    pub fn say(self, line: &str) {
+        match self {
+            Display::Silent => (),
+            Display::Lines | Display::Bar => streams::notice(line),
+        }
+    }
+
+    /// Begins to follow a piece of work; the time that is left is told from here.
+    pub fn follow(self) -> Follower {
+        let bar = match self {
+            Display::Silent | Display::Lines => ProgressBar::hidden(),
+            Display::Bar => bar(),
+        };
+        Follower { display: self, bar, started: Instant::now(), last: Mutex::new(None) }
+    }
+}
+
+impl Follower {
+    /// Shows where the work stands. Called from any thread, and quick: a thread that is showing right now is not
+    /// waited for.
+    pub fn show(&self, progress: &Progress) {
+        let Ok(mut last) = self.last.try_lock() else { return };
+        let shown = Shown {
+            step: (progress.phase, progress.reduction, progress.cycle),
+            view: progress.view,
+            bar_steps: (progress.done * BAR_STEPS) as u64,
+        };
+        // A thread that was overtaken has nothing new to say.
+        if last.is_some_and(|last| last == shown || shown.bar_steps < last.bar_steps) {
+            return;
+        }
+        match self.display {
+            Display::Silent => (),
+            Display::Lines if last.is_some_and(|last| last.step == shown.step) => (),
+            Display::Lines => streams::notice(&line(progress, self.started.elapsed())),
+            Display::Bar => {
+                self.bar.set_message(message(progress, self.started.elapsed()));
+                self.bar.set_position(shown.bar_steps);
+            }
+        }
+        *last = Some(shown);
+    }
+}
+
+impl Drop for Follower {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+fn bar() -> ProgressBar {
+    let template = ProgressStyle::with_template("{bar:12} {percent:>3} %  {wide_msg}");
+    let style = template.unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::with_draw_target(Some(BAR_STEPS as u64), ProgressDrawTarget::stderr()).with_style(style)
+}
+
+/// What is beside the bar, for example `search at 1/2 size, cycle 1, view 3 of 7, 0:41 left`.
+fn message(progress: &Progress, elapsed: Duration) -> String {
+    let view = format!("view {} of {}", progress.view + 1, progress.views);
+    format!("{}, {view}{}", step(progress), left(progress.done, elapsed))
+}
+
+/// A line of its own, for example `search at full size, cycle 1, 7 views: 62 % done, 0:41 left`.
+fn line(progress: &Progress, elapsed: Duration) -> String {
+    let percent = (progress.done * 100.0) as u32;
+    let left = left(progress.done, elapsed);
+    format!("{}, {} views: {percent} % done{left}", step(progress), progress.views)
+}
+
+fn step(progress: &Progress) -> String {
+    let phase = progress.phase.name();
+    match (progress.phase, progress.reduction) {
+        (Phase::Fusion, _) => phase.to_owned(),
+        (_, 1) => format!("{phase} at full size, cycle {}", progress.cycle + 1),
+        (_, reduction) => format!("{phase} at 1/{reduction} size, cycle {}", progress.cycle + 1),
+    }
+}
+
+/// `, 0:41 left`, or nothing as long as there is nothing to tell it from.
+fn left(done: f64, elapsed: Duration) -> String {
+    if done < FIRST_ESTIMATE {
+        return String::new();
+    }
+    let seconds = (elapsed.as_secs_f64() * (1.0 - done.min(1.0)) / done).round() as u64;
+    let (hours, minutes, seconds) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
+    match hours {
+        0 => format!(", {minutes}:{seconds:02} left"),
+        _ => format!(", {hours}:{minutes:02}:{seconds:02} left"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const QUARTER_DONE: Progress =
+        Progress { phase: Phase::Search, reduction: 2, cycle: 0, view: 2, views: 7, done: 0.25 };
+
+    #[test]
+    fn the_time_left_comes_from_the_share_done_and_the_time_it_took() {
+        assert_eq!(left(0.25, Duration::from_secs(10)), ", 0:30 left");
+        assert_eq!(left(0.5, Duration::from_secs(3725)), ", 1:02:05 left");
+        assert_eq!(left(1.0, Duration::from_secs(10)), ", 0:00 left");
+    }
+
+    #[test]
+    fn no_time_is_told_before_anything_is_done() {
+        assert_eq!(left(0.0, Duration::from_secs(10)), "");
+    }
+
+    #[test]
+    fn the_bar_names_phase_size_cycle_and_view_counted_from_one() {
+        let text = message(&QUARTER_DONE, Duration::from_secs(10));
+        assert_eq!(text, "search at 1/2 size, cycle 1, view 3 of 7, 0:30 left");
+    }
+
+    #[test]
+    fn a_line_speaks_of_all_views() {
+        let progress = Progress { phase: Phase::Fusion, ..QUARTER_DONE };
+        assert_eq!(line(&progress, Duration::from_secs(10)), "fusion, 7 views: 25 % done, 0:30 left");
+    }
+}

@@ -1,0 +1,181 @@
+//! `report.json`: what a run did, in numbers. Tools read the fields; a name once given stays.
+
+use crate::info;
+use crate::stopwatch::Times;
+use serde::Serialize;
+use skep::simd::Level;
+use skep::{Counts, CycleRecord, Options, Outcome, Reconstruction, Result, Scene, ViewResult};
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::Path;
+
+/// The whole report.
+#[derive(Serialize)]
+pub struct Report {
+    version: &'static str,
+    simd: &'static str,
+    threads: usize,
+    preset: String,
+    options: BTreeMap<&'static str, String>,
+    warnings: Vec<String>,
+    pub totals: Totals,
+    phases: Times,
+    views: Vec<ViewReport>,
+}
+
+/// The whole run.
+#[derive(Default, Serialize)]
+pub struct Totals {
+    pub pixels: u64,
+    pub outcomes: BTreeMap<&'static str, u64>,
+    pub ncc_evaluations: u64,
+    pub samples: u64,
+    pub early_outs: u64,
+    pub cycles: Vec<CycleReport>,
+    pub points: usize,
+    pub wall_seconds: f64,
+    pub cpu_seconds: f64,
+    pub peak_resident_bytes: Option<u64>,
+}
+
+#[derive(Serialize)]
+struct ViewReport {
+    name: String,
+    width: u32,
+    height: u32,
+    pixels: u64,
+    near: f64,
+    far: f64,
+    sources: Vec<String>,
+    outcomes: BTreeMap<&'static str, u64>,
+    ncc_evaluations: u64,
+    samples: u64,
+    early_outs: u64,
+    cycles: Vec<CycleReport>,
+}
+
+/// A cycle of one view, or of all views together.
+#[derive(Serialize)]
+pub struct CycleReport {
+    reduction: u32,
+    cycle: u32,
+    pixels: u64,
+    changed: u64,
+    validated: u64,
+}
+
+impl Report {
+    /// Collects it; the times are those until now and can be brought up to date with [`Report::set_times`].
+    pub fn new(scene: &Scene, preset: &str, options: &Options, result: &Reconstruction) -> Report {
+        let views =
+            result.views.iter().enumerate().map(|(index, view)| view_report(scene, index, view)).collect();
+        Report {
+            version: env!("CARGO_PKG_VERSION"),
+            simd: options.simd.unwrap_or_else(Level::detect).name(),
+            threads: if options.threads == 0 { info::cores() } else { options.threads },
+            preset: preset.to_owned(),
+            options: options.entries().into_iter().collect(),
+            warnings: result.warnings.clone(),
+            totals: totals(scene, result),
+            phases: Times::default(),
+            views,
+        }
+    }
+
+    /// Sets the time of each phase and of all together, and the memory that was needed.
+    pub fn set_times(&mut self, times: Times) {
+        let total = times.total();
+        self.phases = times;
+        self.totals.wall_seconds = total.wall_seconds;
+        self.totals.cpu_seconds = total.cpu_seconds;
+        self.totals.peak_resident_bytes = peak_resident_bytes();
+    }
+
+    /// Writes it, whole or not at all.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        skep::io::write_file(path, |out| {
+            serde_json::to_writer_pretty(&mut *out, self)?;
+            out.write_all(b"\n")
+        })
+    }
+}
+
+fn totals(scene: &Scene, result: &Reconstruction) -> Totals {
+    let mut counts = Counts::default();
+    let mut outcomes = [0; Outcome::ALL.len()];
+    let mut cycles: Vec<CycleRecord> = Vec::new();
+    for view in &result.views {
+        counts += view.counts;
+        for (total, count) in outcomes.iter_mut().zip(view.outcome_counts()) {
+            *total += count;
+        }
+        for cycle in &view.cycles {
+            add_cycle(&mut cycles, cycle);
+        }
+    }
+    // Coarse to fine: the order in which a run goes through them.
+    cycles.sort_by_key(|cycle| (std::cmp::Reverse(cycle.reduction), cycle.cycle));
+    Totals {
+        pixels: scene.views().iter().map(|view| view.camera.pixels() as u64).sum(),
+        outcomes: by_name(outcomes),
+        ncc_evaluations: counts.ncc_evaluations,
+        samples: counts.samples,
+        early_outs: counts.early_outs,
+        cycles: cycles.iter().map(CycleReport::from).collect(),
+        points: result.points.positions.len(),
+        wall_seconds: 0.0,
+        cpu_seconds: 0.0,
+        peak_resident_bytes: None,
+    }
+}
+
+/// Adds a view's cycle to the one of the same scale and number.
+fn add_cycle(cycles: &mut Vec<CycleRecord>, cycle: &CycleRecord) {
+    let same = |total: &&mut CycleRecord| (total.reduction, total.cycle) == (cycle.reduction, cycle.cycle);
+    match cycles.iter_mut().find(same) {
+        Some(total) => {
+            total.pixels += cycle.pixels;
+            total.changed += cycle.changed;
+            total.validated += cycle.validated;
+        }
+        None => cycles.push(*cycle),
+    }
+}
+
+fn view_report(scene: &Scene, index: usize, result: &ViewResult) -> ViewReport {
+    let view = &scene.views()[index];
+    let range = scene.depth_range(index);
+    ViewReport {
+        name: view.name.clone(),
+        width: view.camera.width,
+        height: view.camera.height,
+        pixels: view.camera.pixels() as u64,
+        near: range.near,
+        far: range.far,
+        sources: result.sources.iter().map(|&source| scene.views()[source as usize].name.clone()).collect(),
+        outcomes: by_name(result.outcome_counts()),
+        ncc_evaluations: result.counts.ncc_evaluations,
+        samples: result.counts.samples,
+        early_outs: result.counts.early_outs,
+        cycles: result.cycles.iter().map(CycleReport::from).collect(),
+    }
+}
+
+fn by_name(counts: [u64; Outcome::ALL.len()]) -> BTreeMap<&'static str, u64> {
+    Outcome::ALL.iter().map(|outcome| outcome.name()).zip(counts).collect()
+}
+
+impl From<&CycleRecord> for CycleReport {
+    fn from(cycle: &CycleRecord) -> CycleReport {
+        let &CycleRecord { reduction, cycle, pixels, changed, validated } = cycle;
+        CycleReport { reduction, cycle, pixels, changed, validated }
+    }
+}
+
+/// The most memory the process has held, where the system tells (Linux).
+fn peak_resident_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    kibibytes.checked_mul(1024)
+}

@@ -1,0 +1,352 @@
+//! The command line from outside: what it prints, what it writes, how it ends.
+#![cfg(feature = "cli")]
+
+mod layouts;
+
+use layouts::{check_cloud, check_maps, map};
+use serde_json::Value;
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use tempfile::TempDir;
+
+const WIDTH: usize = 640;
+const HEIGHT: usize = 360;
+/// The board's photographs in the order of the model's file.
+const NAMES: [&str; 7] =
+    ["key.jpg", "source0.jpg", "source1.jpg", "source2.jpg", "source3.jpg", "source4.jpg", "source5.jpg"];
+
+fn skep(arguments: &[&str]) -> Output {
+    command(arguments).output().expect("skep starts")
+}
+
+fn command(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_skep"));
+    command.args(arguments).stdin(Stdio::null());
+    command
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).expect("skep prints UTF-8")
+}
+
+/// The exit status and what was printed about the failure.
+fn failure(arguments: &[&str]) -> (Option<i32>, String) {
+    let output = skep(arguments);
+    assert!(output.stdout.is_empty(), "a failure prints no results: {}", text(&output.stdout));
+    (output.status.code(), text(&output.stderr).to_owned())
+}
+
+fn board() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/data/board")
+}
+
+/// A copy of the board's scene: `SCENE/dense` goes there, not into the repository.
+fn copied_board() -> TempDir {
+    let folder = TempDir::new().unwrap();
+    for part in ["images", "sparse"] {
+        fs::create_dir(folder.path().join(part)).unwrap();
+        for entry in fs::read_dir(board().join(part)).unwrap() {
+            let entry = entry.unwrap();
+            fs::copy(entry.path(), folder.path().join(part).join(entry.file_name())).unwrap();
+        }
+    }
+    folder
+}
+
+/// The board at a quarter of its size, for runs that need not find much.
+fn small_board() -> TempDir {
+    let folder = copied_board();
+    for name in NAMES {
+        let path = folder.path().join("images").join(name);
+        let photograph = image::open(&path).unwrap();
+        let (width, height) = (WIDTH as u32 / 4, HEIGHT as u32 / 4);
+        photograph.resize_exact(width, height, image::imageops::FilterType::Triangle).save(&path).unwrap();
+    }
+    let cameras = folder.path().join("sparse/cameras.txt");
+    let original = fs::read_to_string(&cameras).unwrap();
+    let fields: Vec<&str> =
+        original.lines().find(|line| !line.starts_with('#')).unwrap().split_whitespace().collect();
+    let quarters: Vec<String> =
+        fields[2..].iter().map(|number| (number.parse::<f64>().unwrap() / 4.0).to_string()).collect();
+    fs::write(&cameras, format!("{} {} {}\n", fields[0], fields[1], quarters.join(" "))).unwrap();
+    folder
+}
+
+fn path(folder: &TempDir) -> &str {
+    folder.path().to_str().unwrap()
+}
+
+fn report(dense: &Path) -> Value {
+    serde_json::from_slice(&fs::read(dense.join("report.json")).unwrap()).unwrap()
+}
+
+/// All files below a folder with their sizes.
+fn files(folder: &Path) -> Vec<(PathBuf, u64)> {
+    let mut found = Vec::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let entry = entry.unwrap();
+            match entry.file_type().unwrap().is_dir() {
+                true => folders.push(entry.path()),
+                false => found.push((entry.path(), entry.metadata().unwrap().len())),
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn info_tells_version_machine_and_every_option_of_both_presets() {
+    let output = skep(&["info"]);
+    assert!(output.status.success());
+    let printed = text(&output.stdout);
+    assert!(printed.starts_with(&format!("skep {}\n", env!("CARGO_PKG_VERSION"))), "{printed}");
+    assert!(printed.contains("SIMD level: ") && printed.contains("threads: "), "{printed}");
+    for (name, value) in [skep::Options::default(), skep::Options::paper()].iter().flat_map(|o| o.entries()) {
+        let row = printed.lines().find(|line| line.split_whitespace().next() == Some(name));
+        let row = row.unwrap_or_else(|| panic!("no row for {name}:\n{printed}"));
+        let first_part = value.split("; ").next().unwrap();
+        assert!(row.contains(first_part), "{row} lacks {first_part}");
+    }
+}
+
+#[test]
+fn help_names_files_and_ways_out() {
+    let output = skep(&["help", "reconstruct"]);
+    assert!(output.status.success());
+    for word in ["fused.ply", "report.json", "preview/", "image_undistorter", "--depth-range", "Examples:"] {
+        assert!(text(&output.stdout).contains(word), "help lacks {word}");
+    }
+}
+
+#[test]
+fn wrong_arguments_end_with_status_2_and_say_what_would_be_right() {
+    let scene = board();
+    let scene = scene.to_str().unwrap();
+    let cases: [(&[&str], &str); 8] = [
+        (&[], "Usage:"),
+        (&["reconstruct"], "<SCENE>"),
+        (&["reconstruct", scene, "--preset", "fast"], "default, paper"),
+        (&["reconstruct", scene, "--without", "rewards"], "view-selection, reward, propagation"),
+        (
+            &["reconstruct", scene, "--depth-range", "2", "1"],
+            "--depth-range is 2 to 1; expected finite depths",
+        ),
+        (&["reconstruct", scene, "--depth-range", "NaN", "1"], "0 < near < far"),
+        (&["reconstruct", scene, "--depth-range", "-1", "1"], "0 < near < far"),
+        (&["reconstruct", scene, "--threads", "many"], "--threads"),
+    ];
+    for (arguments, expected) in cases {
+        let (status, printed) = failure(arguments);
+        assert_eq!(status, Some(2), "{arguments:?}: {printed}");
+        assert!(printed.contains(expected), "{arguments:?} lacks {expected}: {printed}");
+    }
+}
+
+#[test]
+fn a_missing_scene_ends_with_status_1_and_its_name() {
+    let folder = TempDir::new().unwrap();
+    let scene = folder.path().join("nowhere");
+    for command in ["reconstruct", "fuse"] {
+        let (status, printed) = failure(&[command, scene.to_str().unwrap()]);
+        assert_eq!(status, Some(1), "{printed}");
+        assert!(printed.contains(scene.to_str().unwrap()), "{printed}");
+    }
+    assert!(!scene.exists(), "nothing is made for a scene there is not");
+}
+
+#[test]
+fn without_points_the_error_names_both_ways_out_and_a_range_is_one() {
+    let scene = small_board();
+    fs::write(scene.path().join("sparse/points3D.txt"), "").unwrap();
+    let (status, printed) = failure(&["reconstruct", path(&scene)]);
+    assert_eq!(status, Some(1), "{printed}");
+    assert!(printed.contains("sparse points") && printed.contains("--depth-range MIN MAX"), "{printed}");
+
+    let output = skep(&["reconstruct", path(&scene), "--depth-range", "0.3", "1.5"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let report = report(&scene.path().join("dense"));
+    assert_eq!((&report["views"][0]["near"], &report["views"][0]["far"]), (&0.3.into(), &1.5.into()));
+}
+
+#[test]
+fn an_output_that_cannot_be_written_is_found_out_before_the_work() {
+    let scene = small_board();
+    let occupied = scene.path().join("occupied");
+    fs::write(&occupied, "a file").unwrap();
+    let (status, printed) = failure(&["reconstruct", path(&scene), "--output", occupied.to_str().unwrap()]);
+    assert_eq!(status, Some(1));
+    assert!(printed.contains("occupied: cannot be written to"), "{printed}");
+    assert!(!printed.contains("search"), "{printed}");
+}
+
+#[test]
+fn parts_of_the_method_can_be_left_out_quietly() {
+    let scene = small_board();
+    let output = skep(&[
+        "reconstruct",
+        path(&scene),
+        "--quiet",
+        "--threads",
+        "2",
+        "--seed",
+        "7",
+        "--without",
+        "view-selection,reward,propagation",
+    ]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(output.stdout.is_empty(), "{}", text(&output.stdout));
+    assert!(
+        text(&output.stderr).lines().all(|line| line.starts_with("warning: ")),
+        "{}",
+        text(&output.stderr)
+    );
+    let report = report(&scene.path().join("dense"));
+    let option = |name: &str| report["options"][name].as_str().unwrap();
+    assert_eq!([option("view_selection"), option("reward"), option("propagation")], ["false", "0", "false"]);
+    assert_eq!((option("seed"), &report["threads"]), ("7", &2.into()));
+}
+
+/// README's first command, on a copy: every promised file with its layout, the report, then the cloud again from the
+/// maps alone.
+#[test]
+fn the_embedded_scene_end_to_end() {
+    let repository = files(&board());
+    let scene = copied_board();
+    let output = skep(&["reconstruct", path(&scene)]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let dense = scene.path().join("dense");
+    let report = report(&dense);
+
+    for (index, name) in NAMES.iter().enumerate() {
+        let validated = &report["views"][index]["outcomes"]["validated"];
+        check_maps(&dense, name, validated.as_u64().unwrap() as usize);
+        for what in ["depth", "normal", "views"] {
+            let preview = dense.join(format!("preview/{name}.{what}.png"));
+            assert_eq!(image::image_dimensions(preview).unwrap(), (WIDTH as u32, HEIGHT as u32));
+        }
+    }
+    let points = check_cloud(&dense.join("fused.ply"));
+    assert!(points > 50_000, "{points} points");
+    assert_eq!(report["totals"]["points"], points);
+    check_report(&report);
+    check_summary(text(&output.stdout), &dense, points);
+    check_lines(text(&output.stderr));
+
+    let again = dense.join("again.ply");
+    let output = skep(&["fuse", dense.to_str().unwrap(), "--output", again.to_str().unwrap()]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let points_again = check_cloud(&again);
+    assert!(points_again > 50_000, "{points_again} points from the maps alone");
+    assert_eq!(files(&board()), repository, "nothing is written into the repository");
+}
+
+/// The fields that tools read, and that the views add up to the totals.
+fn check_report(report: &Value) {
+    let totals = &report["totals"];
+    assert_eq!(totals["pixels"], NAMES.len() * WIDTH * HEIGHT);
+    for field in ["cpu_seconds", "wall_seconds"] {
+        assert!(totals[field].as_f64().unwrap() > 0.0, "{field}");
+        for phase in ["reading", "search", "check", "fusion", "writing"] {
+            assert!(report["phases"][phase][field].as_f64().unwrap() >= 0.0, "{phase}.{field}");
+        }
+    }
+    if cfg!(target_os = "linux") {
+        assert!(totals["peak_resident_bytes"].as_u64().unwrap() > 1 << 20);
+    }
+    let views = report["views"].as_array().unwrap();
+    let names: Vec<&str> = views.iter().map(|view| view["name"].as_str().unwrap()).collect();
+    assert_eq!(names, NAMES);
+    for field in ["pixels", "ncc_evaluations", "samples", "early_outs"] {
+        let sum: u64 = views.iter().map(|view| view[field].as_u64().unwrap()).sum();
+        assert_eq!(totals[field], sum, "{field}");
+    }
+    for outcomes in [&totals["outcomes"], &views[0]["outcomes"]] {
+        assert_eq!(outcomes.as_object().unwrap().len(), skep::Outcome::ALL.len());
+    }
+    let outcomes = totals["outcomes"].as_object().unwrap().values();
+    assert_eq!(totals["pixels"], outcomes.map(|count| count.as_u64().unwrap()).sum::<u64>());
+    assert!(totals["ncc_evaluations"].as_u64() > Some(0) && totals["samples"].as_u64() > Some(0));
+    assert!(!totals["cycles"].as_array().unwrap().is_empty());
+    assert!(totals["cycles"][0]["changed"].as_u64() > Some(0));
+    assert_eq!(
+        (&report["version"], &report["preset"]),
+        (&env!("CARGO_PKG_VERSION").into(), &"default".into())
+    );
+    assert!(["scalar", "base", "v3"].contains(&report["simd"].as_str().unwrap()));
+    assert_eq!(report["options"].as_object().unwrap().len(), skep::Options::default().entries().len());
+    assert!(report["threads"].as_u64() > Some(0) && report["warnings"].is_array());
+}
+
+/// The last lines say where to look.
+fn check_summary(printed: &str, dense: &Path, points: usize) {
+    let cloud = format!("{points} points in {}", dense.join("fused.ply").display());
+    assert!(printed.contains(&cloud), "{printed}");
+    assert!(printed.contains("% of 1612800 pixels validated"), "{printed}");
+    for place in ["preview/key.jpg.depth.png", "stereo", "report.json"] {
+        assert!(printed.contains(dense.join(place).to_str().unwrap()), "{printed}");
+    }
+}
+
+/// Where there is no terminal, a line for each step that is new, and no more.
+fn check_lines(printed: &str) {
+    let steps: Vec<&str> = printed.lines().filter_map(|line| line.split(", 7 views:").next()).collect();
+    assert!(steps.iter().any(|step| step.starts_with("search")), "{printed}");
+    assert!(steps.contains(&"fusion"), "{printed}");
+    assert!(steps.windows(2).all(|pair| pair[0] != pair[1]), "a step is announced once:\n{printed}");
+    assert!(!printed.contains('\r') && !printed.contains('\u{1b}'), "no bar without a terminal:\n{printed}");
+}
+
+/// Starts a run and sends it a signal once a line of its progress begins with `cue`; gives its exit status and what it
+/// printed after the cue.
+#[cfg(unix)]
+fn interrupted(arguments: &[&str], cue: &str, signal: &str) -> (Option<i32>, String) {
+    let mut process = command(arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(process.stderr.take().unwrap()).lines().map(|line| line.unwrap());
+    assert!(lines.by_ref().any(|line| line.starts_with(cue)), "no line begins with {cue}");
+    let sent = Command::new("kill").args([signal, &process.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    let printed = lines.collect::<Vec<_>>().join("\n");
+    (process.wait().unwrap().code(), printed)
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_and_sigterm_during_the_search_leave_everything_as_it_was() {
+    let output = TempDir::new().unwrap();
+    let earlier = output.path().join("report.json");
+    for signal in ["-INT", "-TERM"] {
+        fs::write(&earlier, "of an earlier run").unwrap();
+        let board = board();
+        let arguments = ["reconstruct", board.to_str().unwrap(), "--output", path(&output)];
+        let (status, printed) = interrupted(&arguments, "search", signal);
+        assert_eq!(status, Some(130), "{printed}");
+        assert!(printed.contains("interrupted: nothing was written"), "{printed}");
+        assert_eq!(files(output.path()), [(earlier.clone(), 17)]);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_during_the_writing_leaves_whole_files() {
+    let scene = small_board();
+    let (status, printed) = interrupted(&["reconstruct", path(&scene)], "writing", "-INT");
+    let dense = scene.path().join("dense");
+    // The writing of so little may be over before the signal arrives.
+    let finished = status == Some(0);
+    assert!(finished || status == Some(130) && printed.contains("whole"), "{status:?} {printed}");
+    assert_eq!(finished, dense.join("report.json").exists(), "a report stands beside finished runs only");
+    for (path, _) in files(&dense.join("stereo")) {
+        let channels = match path.components().any(|part| part.as_os_str() == "normal_maps") {
+            true => 3,
+            false => 1,
+        };
+        let is_graph = path.components().any(|part| part.as_os_str() == "consistency_graphs");
+        let whole = is_graph || map(&path, WIDTH / 4, HEIGHT / 4, channels).is_some();
+        assert!(whole, "{} is not whole", path.display());
+    }
+}
