@@ -22,22 +22,20 @@ pub struct Giver<'a> {
 /// The offers to the pixels of a target view that are not validated: for each the one of lowest cost among all
 /// solutions that project there and agree with at least one source view. The order of `givers` does not matter.
 pub fn offers(camera: &Camera, state: &ViewState, range: DepthRange, givers: &[Giver]) -> Vec<Offer> {
+    let nothing = || vec![Ranked::default(); camera.pixels()];
     let from_one = |giver: &Giver| {
-        let mut offers = vec![Ranked::default(); camera.pixels()];
+        let mut offers = nothing();
         give(camera, state, range, giver, &mut offers);
         offers
     };
     let merge = |mut ours: Vec<Ranked>, theirs: Vec<Ranked>| {
-        if ours.is_empty() {
-            return theirs;
-        }
         for (ours, theirs) in ours.iter_mut().zip(&theirs) {
             ours.keep_better(theirs);
         }
         ours
     };
-    let ranked = givers.par_iter().map(from_one).reduce(Vec::new, merge);
-    ranked.into_iter().map(|ranked| ranked.offer).collect()
+    let ranked = givers.par_iter().map(from_one).reduce_with(merge);
+    ranked.unwrap_or_else(nothing).into_iter().map(|ranked| ranked.offer).collect()
 }
 
 /// An offer and who makes it.
