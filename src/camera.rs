@@ -41,7 +41,11 @@ impl Camera {
         }
         for (field, focal) in [("fx", self.fx), ("fy", self.fy)] {
             if !(focal.is_finite() && focal > 0.0) {
-                return Err(Error::argument(format!("{name}.{field}"), focal, "a finite focal length above 0"));
+                return Err(Error::argument(
+                    format!("{name}.{field}"),
+                    focal,
+                    "a finite focal length above 0",
+                ));
             }
         }
         for (field, value) in [("cx", self.cx), ("cy", self.cy)] {
@@ -97,9 +101,8 @@ impl Camera {
 
     /// The pixel a point of the camera frame falls on, `None` at or behind the camera.
     pub fn project_camera(&self, point: DVec3) -> Option<DVec2> {
-        (point.z > 0.0).then(|| {
-            DVec2::new(self.fx * point.x / point.z + self.cx, self.fy * point.y / point.z + self.cy)
-        })
+        (point.z > 0.0)
+            .then(|| DVec2::new(self.fx * point.x / point.z + self.cx, self.fy * point.y / point.z + self.cy))
     }
 
     /// The pixel and depth of a world point, `None` at or behind the camera.

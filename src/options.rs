@@ -126,7 +126,13 @@ impl Options {
             threads: 0,
             simd: None,
             // FoodNumber is the paper's; it never gives its numbers of iterations and cycles.
-            scales: vec![Scale { halvings: 0, foods: 10, first_iterations: 20, cycles: 3, cycle_iterations: 2 }],
+            scales: vec![Scale {
+                halvings: 0,
+                foods: 10,
+                first_iterations: 20,
+                cycles: 3,
+                cycle_iterations: 2,
+            }],
             trial_limit: 10,
             stop_share: 0.01,
             window_radius: 5,
@@ -169,7 +175,12 @@ impl Options {
         check_number("colour_sigma", self.colour_sigma, 1e-3, 1e6)?;
         check_number("min_variance", self.min_variance, 0.0, 1.0)?;
         check_number("triangulation_angle.min", self.triangulation_angle.0, 0.0, 180.0)?;
-        check_number("triangulation_angle.max", self.triangulation_angle.1, self.triangulation_angle.0, 180.0)?;
+        check_number(
+            "triangulation_angle.max",
+            self.triangulation_angle.1,
+            self.triangulation_angle.0,
+            180.0,
+        )?;
         check_number("max_incident_angle", self.max_incident_angle, 0.0, 90.0)?;
         check_number("occlusion_margin", self.occlusion_margin, 0.0, 1.0)?;
         check_number("reward", self.reward, 0.0, 1.0)?;

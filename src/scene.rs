@@ -65,7 +65,11 @@ impl Scene {
         }
         for (index, point) in points.iter().enumerate() {
             if !point.position.is_finite() {
-                return Err(Error::argument(format!("points[{index}]"), point.position, "finite coordinates"));
+                return Err(Error::argument(
+                    format!("points[{index}]"),
+                    point.position,
+                    "finite coordinates",
+                ));
             }
             if let Some(view) = point.views.iter().find(|&&view| view as usize >= views.len()) {
                 let expected = format!("an index below the number of views, {}", views.len());
@@ -100,7 +104,9 @@ impl Scene {
 fn check_names(views: &[View]) -> Result<()> {
     let mut seen = std::collections::HashSet::new();
     match views.iter().find(|view| !seen.insert(view.name.as_str())) {
-        Some(view) => Err(Error::argument("views", format!("{} twice", view.name), "a different name for each view")),
+        Some(view) => {
+            Err(Error::argument("views", format!("{} twice", view.name), "a different name for each view"))
+        }
         None => Ok(()),
     }
 }
@@ -130,7 +136,11 @@ impl DepthRange {
         if self.near > 0.0 && self.near < self.far && self.far.is_finite() {
             return Ok(());
         }
-        Err(Error::argument(name, format!("{} to {}", self.near, self.far), "finite depths with 0 < near < far"))
+        Err(Error::argument(
+            name,
+            format!("{} to {}", self.near, self.far),
+            "finite depths with 0 < near < far",
+        ))
     }
 }
 
