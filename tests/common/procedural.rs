@@ -61,7 +61,7 @@ const FOCAL: f64 = 130.0;
 /// Distance of the standard cameras from the world's origin.
 const DISTANCE: f64 = 4.0;
 /// Rays a pixel's side: the image is the mean over the pixel's area.
-const SUPERSAMPLES: u32 = 4;
+const SUPERSAMPLES: u32 = 3;
 /// Pixels between the sparse points.
 const POINT_STEP: usize = 7;
 
