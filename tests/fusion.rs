@@ -35,11 +35,7 @@ fn fuse_maps(made: &Procedural, maps: &[Maps], options: FusionOptions) -> PointC
 /// Distance to the nearest surface.
 fn error(made: &Procedural, position: [f64; 3]) -> f64 {
     let point = DVec3::from_array(position);
-    let distance = |surface: &Surface| match surface.shape {
-        Shape::Rectangle { centre, right, down, .. } => (point - centre).dot(right.cross(down)).abs(),
-        Shape::Sphere { centre, radius } => (point.distance(centre) - radius).abs(),
-    };
-    made.surfaces.iter().map(distance).fold(f64::INFINITY, f64::min)
+    made.surfaces.iter().map(|surface| surface.shape.distance(point)).fold(f64::INFINITY, f64::min)
 }
 
 fn mean_error(made: &Procedural, cloud: &PointCloud) -> f64 {

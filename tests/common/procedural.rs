@@ -72,6 +72,14 @@ impl Shape {
         Shape::Rectangle { centre, right: DVec3::new(cosine, 0.0, sine), down: DVec3::Y, half_size }
     }
 
+    /// Distance of a point from the sphere or from the rectangle's plane.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        match *self {
+            Shape::Rectangle { centre, right, down, .. } => (point - centre).dot(right.cross(down)).abs(),
+            Shape::Sphere { centre, radius } => (point.distance(centre) - radius).abs(),
+        }
+    }
+
     /// The nearest meeting in front of `origin`: distance in multiples of `direction`, and outward normal.
     fn meet(&self, origin: DVec3, direction: DVec3) -> Option<(f64, DVec3)> {
         match *self {
@@ -132,6 +140,21 @@ impl Procedural {
     /// The checked scene.
     pub fn scene(&self) -> Scene {
         Scene::new(self.views.clone(), self.points.clone()).expect("a procedural scene is in order")
+    }
+
+    /// The scene with only these views, in this order.
+    pub fn only(&self, kept: &[usize]) -> Procedural {
+        let place = |view: &u32| kept.iter().position(|&k| k == *view as usize).map(|place| place as u32);
+        let points = self.points.iter().map(|point| SparsePoint {
+            position: point.position,
+            views: point.views.iter().filter_map(place).collect(),
+        });
+        Procedural {
+            surfaces: self.surfaces.clone(),
+            views: kept.iter().map(|&view| self.views[view].clone()).collect(),
+            points: points.filter(|point| point.views.len() >= 2).collect(),
+            truth: kept.iter().map(|&view| self.truth[view].clone()).collect(),
+        }
     }
 
     /// What is seen at the centre of a pixel.
