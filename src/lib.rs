@@ -3,18 +3,24 @@
 #![warn(missing_docs)]
 #![deny(unsafe_code)]
 
+mod ambc;
 pub mod camera;
+mod consistency;
 mod error;
 pub mod fusion;
 pub mod image;
 #[cfg(feature = "io")]
 pub mod io;
+pub mod kernels;
 mod maps;
 mod options;
+mod outcome;
 mod progress;
+mod propagation;
 mod scene;
 pub mod simd;
 mod solve;
+mod state;
 pub mod views;
 
 pub use error::{Error, Result};

@@ -23,7 +23,7 @@ pub struct Scale {
 pub enum Aggregation {
     /// The sum over S divided by |S| - 1, infinite for |S| <= 1 (equation 3 of the paper).
     AllViews,
-    /// The mean over the best k views of S: views that cannot see the point yet do not count.
+    /// The mean over the best k views of S, 1 to 8: views that cannot see the point yet do not count.
     BestViews(u32),
 }
 
@@ -75,6 +75,14 @@ pub struct Options {
     pub min_variance: f64,
     /// How the costs of the source views become one.
     pub aggregation: Aggregation,
+    /// From the second cycle on a pixel is matched only with this many views of its set, those in which its solution
+    /// costs least; 0 takes the whole set.
+    pub focused_views: u32,
+    /// Half the range of relative inverse depth in which the colonies of later cycles start around the pixel's solution,
+    /// halved with every cycle of a scale; 0 starts them at random (`paper`).
+    pub restart_spread: f64,
+    /// How far the normals of those colonies are tilted, as the half side of a cube added to the unit normal.
+    pub restart_tilt: f64,
 
     /// Whether the view set of each pixel is refined by incidence and visibility. Off keeps the start set.
     pub view_selection: bool,
@@ -149,6 +157,9 @@ impl Options {
             colour_sigma: 0.2,
             min_variance: 1e-5,
             aggregation: Aggregation::AllViews,
+            focused_views: 0,
+            restart_spread: 0.0,
+            restart_tilt: 0.0,
             view_selection: true,
             triangulation_angle: (10.0, 30.0),
             max_sources: 0,
@@ -176,12 +187,14 @@ impl Options {
         check_whole("window_step", self.window_step, 1, 8)?;
         check_whole("min_consistent", self.min_consistent, 1, u32::MAX)?;
         if let Aggregation::BestViews(views) = self.aggregation {
-            check_whole("aggregation.best_views", views, 1, 64)?;
+            check_whole("aggregation.best_views", views, 1, 8)?;
         }
         check_number("stop_share", self.stop_share, 0.0, 1.0)?;
         check_number("spatial_sigma", self.spatial_sigma, 1e-3, 1e6)?;
         check_number("colour_sigma", self.colour_sigma, 1e-3, 1e6)?;
         check_number("min_variance", self.min_variance, 0.0, 1.0)?;
+        check_number("restart_spread", self.restart_spread, 0.0, 0.5)?;
+        check_number("restart_tilt", self.restart_tilt, 0.0, 10.0)?;
         check_number("triangulation_angle.min", self.triangulation_angle.0, 0.0, 180.0)?;
         check_number(
             "triangulation_angle.max",
@@ -202,10 +215,14 @@ impl Options {
     }
 
     fn check_scales(&self) -> Result<()> {
-        let descending = self.scales.windows(2).all(|pair| pair[0].halvings > pair[1].halvings);
+        let descending = self.scales.windows(2).all(|pair| pair[0].halvings == pair[1].halvings + 1);
         if !descending || self.scales.last().is_none_or(|last| last.halvings != 0) {
             let halvings: Vec<u32> = self.scales.iter().map(|scale| scale.halvings).collect();
-            return Err(Error::argument("scales", format!("{halvings:?}"), "halvings that descend to 0"));
+            return Err(Error::argument(
+                "scales",
+                format!("{halvings:?}"),
+                "halvings that descend one by one to 0",
+            ));
         }
         for scale in &self.scales {
             check_whole("scales.halvings", scale.halvings, 0, 8)?;
@@ -248,6 +265,9 @@ impl Options {
             ("colour_sigma", self.colour_sigma.to_string()),
             ("min_variance", self.min_variance.to_string()),
             ("aggregation", aggregation),
+            ("focused_views", self.focused_views.to_string()),
+            ("restart_spread", self.restart_spread.to_string()),
+            ("restart_tilt", self.restart_tilt.to_string()),
             ("view_selection", self.view_selection.to_string()),
             ("triangulation_angle", format!("{} to {}", angles.0, angles.1)),
             ("max_sources", self.max_sources.to_string()),
@@ -281,6 +301,9 @@ impl Default for Options {
             spatial_sigma: 4.0,
             colour_sigma: 0.05,
             aggregation: Aggregation::BestViews(3),
+            focused_views: 0,
+            restart_spread: 0.01,
+            restart_tilt: 0.3,
             max_sources: 10,
             reward: 0.1,
             geometric_weight: 0.2,

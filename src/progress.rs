@@ -1,6 +1,7 @@
 //! How a host follows a run and stops it.
 
 use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// What a run is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,15 +38,49 @@ pub struct Progress {
     pub view: usize,
     /// Number of views.
     pub views: usize,
-    /// Share of the whole run that is done, 0 to 1, never falling. Cycles that the stopping rule skips count as done.
+    /// Share of the whole run that is done, 0 to 1. Cycles that the stopping rule skips count as done.
     pub done: f64,
 }
 
-/// A host's hook: called often, from any worker thread, one call at a time or several at once; it must be quick.
+/// A host's hook: called often, from any worker thread, several calls may run at once; it must be quick.
 /// `Break` cancels the run, which then ends with [`crate::Error::Cancelled`] well within a second.
 pub type Hook<'a> = &'a (dyn Fn(&Progress) -> ControlFlow<()> + Sync);
 
 /// The hook of a host that neither looks nor stops.
 pub fn ignore_progress(_: &Progress) -> ControlFlow<()> {
     ControlFlow::Continue(())
+}
+
+/// Counts the work of a run and tells the hook.
+pub(crate) struct Tracker<'a> {
+    hook: Hook<'a>,
+    total: u64,
+    done: AtomicU64,
+    cancelled: AtomicBool,
+}
+
+impl<'a> Tracker<'a> {
+    /// A tracker of `total` units of work.
+    pub fn new(hook: Hook<'a>, total: u64) -> Tracker<'a> {
+        Tracker { hook, total: total.max(1), done: AtomicU64::new(0), cancelled: AtomicBool::new(false) }
+    }
+
+    /// Adds finished work and reports where the run stands; `true` when the host wants to stop.
+    pub fn advance(&self, units: u64, at: Progress) -> bool {
+        let done = self.done.fetch_add(units, Ordering::Relaxed) + units;
+        self.report(done, at)
+    }
+
+    /// Sets the finished work, when some was skipped.
+    pub fn jump_to(&self, units: u64) {
+        self.done.store(units, Ordering::Relaxed);
+    }
+
+    fn report(&self, done: u64, at: Progress) -> bool {
+        let done = (done as f64 / self.total as f64).min(1.0);
+        if (self.hook)(&Progress { done, ..at }).is_break() {
+            self.cancelled.store(true, Ordering::Relaxed);
+        }
+        self.cancelled.load(Ordering::Relaxed)
+    }
 }

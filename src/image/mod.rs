@@ -2,6 +2,8 @@
 
 mod packed;
 mod picture;
+mod pyramid;
 
 pub use packed::PackedImage;
 pub use picture::Picture;
+pub use pyramid::ScaledView;

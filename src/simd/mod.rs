@@ -1,28 +1,64 @@
-//! Instruction sets: one trait, one back-end each, chosen at run time.
+//! Instruction sets: one trait of eight lanes, one back-end each, chosen at run time.
+//!
+//! Every back-end multiplies, then adds, and reduces in the same tree, so all of them give the same bits. A back-end
+//! is a zero-size token: owning one is the proof that the machine has its instructions. Code that runs on it is
+//! generic over [`Simd`], `#[inline(always)]` throughout, and entered through [`Simd::vectorize`] once a tile.
 
-/// An instruction set the kernels are compiled for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Level {
-    /// One lane at a time; the oracle of the tests.
-    Scalar,
-    /// Vectors of the compile target's baseline (SSE2, NEON, wasm simd128).
-    Base,
-    /// x86-64-v3: AVX2.
-    X86V3,
-}
+mod base;
+mod level;
+mod scalar;
+#[cfg(target_arch = "x86_64")]
+mod x86_v3;
 
-impl Level {
-    /// Its name: `scalar`, `base` or `v3`.
-    pub fn name(self) -> &'static str {
-        match self {
-            Level::Scalar => "scalar",
-            Level::Base => "base",
-            Level::X86V3 => "v3",
-        }
-    }
+pub use base::Base;
+pub use level::{Level, Task, dispatch};
+pub use scalar::Scalar;
+#[cfg(target_arch = "x86_64")]
+pub use x86_v3::X86V3;
 
-    /// The best level of this machine, or the one `SKEP_SIMD` asks for when the machine has it.
-    pub fn detect() -> Level {
-        Level::Base
+/// Lanes of every vector.
+pub const LANES: usize = 8;
+
+/// Eight lanes of f32 and what the kernels do with them.
+pub trait Simd: Copy + Send + Sync {
+    /// The level this back-end implements.
+    const LEVEL: Level;
+    /// Eight f32.
+    type F32: Copy;
+
+    /// All lanes the same.
+    fn splat(self, value: f32) -> Self::F32;
+    /// Lanes from memory.
+    fn load(self, lanes: &[f32; LANES]) -> Self::F32;
+    /// Lanes to memory.
+    fn store(self, lanes: Self::F32) -> [f32; LANES];
+    /// `a + b`
+    fn add(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// `a - b`
+    fn sub(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// `a * b`
+    fn mul(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// `a / b`
+    fn div(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// `a > b ? a : b`, so `b` where a lane is not a number.
+    fn max(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// `a < b ? a : b`, so `b` where a lane is not a number.
+    fn min(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// The whole part of lanes in [0, 2^24).
+    fn whole(self, a: Self::F32) -> Self::F32;
+    /// The four bytes, lowest first, of `words[y * stride + x]` for whole, non-negative `x` and `y`. An index beyond
+    /// the words reads the last one; `words` must not be empty.
+    fn gather_bytes(self, words: &[u32], stride: usize, x: Self::F32, y: Self::F32) -> [Self::F32; 4];
+    /// `table[a]` for whole lanes in [0, 255].
+    fn look_up(self, table: &[f32; 256], a: Self::F32) -> Self::F32;
+    /// The sum of the lanes, as `((l0 + l4) + (l2 + l6)) + ((l1 + l5) + (l3 + l7))`.
+    fn sum(self, a: Self::F32) -> f32;
+    /// Runs `f` compiled for this instruction set. Only what is inlined into `f` profits.
+    fn vectorize<R>(self, f: impl FnOnce() -> R) -> R;
+
+    /// `a * b + c`, in two roundings.
+    #[inline(always)]
+    fn mul_add(self, a: Self::F32, b: Self::F32, c: Self::F32) -> Self::F32 {
+        self.add(self.mul(a, b), c)
     }
 }

@@ -1,5 +1,12 @@
-//! Pixelwise view selection (section 4 of the paper).
+//! Pixelwise view selection (section 4 of the paper): the triangulation angle gives each reference view its source
+//! views; incidence and visibility then refine the set of each pixel.
 
+mod angle;
+mod reference;
+mod select;
 mod set;
 
+pub use angle::{SourceLists, source_lists};
+pub use reference::{Reference, Source};
+pub use select::{ViewRules, faces_source, is_occluded};
 pub use set::ViewSets;

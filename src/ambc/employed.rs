@@ -1,0 +1,46 @@
+//! Employed bees: search around the colony's own food sources (section 5.3 of the paper).
+
+use super::cost::Evaluator;
+use super::food::{FoodSource, MIN_FACING};
+use super::random::Random;
+use crate::simd::Simd;
+
+/// Perturbs every food source towards or away from another one of the colony, `y' = y + R(-1,1) (y_n - y)`, in depth or
+/// in normal with equal chance, and keeps what is better.
+#[inline(always)]
+pub fn send<S: Simd>(evaluator: &mut Evaluator<S>, foods: &mut [FoodSource], random: &mut Random) {
+    for index in 0..foods.len() {
+        let other = (index + 1 + random.below(foods.len() - 1)) % foods.len();
+        let (food, other) = (foods[index], foods[other]);
+        let trial = perturb(evaluator, &food, &other, random);
+        if let Some(trial) = trial {
+            let cost = evaluator.cost(&trial, food.cost);
+            if cost < food.cost {
+                foods[index] = FoodSource { cost, ..trial };
+                continue;
+            }
+        }
+        foods[index].trials = food.trials.saturating_add(1);
+    }
+}
+
+/// The perturbed food source, `None` when it is the same one or turns away from the camera.
+#[inline(always)]
+fn perturb<S: Simd>(
+    evaluator: &Evaluator<S>,
+    food: &FoodSource,
+    other: &FoodSource,
+    random: &mut Random,
+) -> Option<FoodSource> {
+    let in_depth = random.below(2) == 0;
+    let amount = random.signed();
+    if in_depth {
+        let reference = evaluator.reference();
+        let depth = (food.depth + amount * (other.depth - food.depth)).clamp(reference.near, reference.far);
+        (depth != food.depth).then(|| FoodSource::new(depth, food.normal))
+    } else {
+        let normal = (food.normal + amount * (other.normal - food.normal)).normalize_or_zero();
+        let valid = normal.dot(evaluator.ray()) < -MIN_FACING && normal != food.normal;
+        valid.then(|| FoodSource::new(food.depth, normal))
+    }
+}

@@ -1,0 +1,16 @@
+//! The Artificial Multi-Bee Colony search (section 5 of the paper): one colony a pixel, whose food sources are planes.
+
+mod colony;
+mod cost;
+mod employed;
+mod food;
+mod onlooker;
+mod random;
+mod schedule;
+mod scout;
+
+pub use colony::Offer;
+pub use cost::CostRules;
+pub use food::{FoodSource, MIN_FACING};
+pub use random::stream;
+pub use schedule::{Assessment, Search, assess};

@@ -1,0 +1,97 @@
+//! Onlooker bees: bring the best plane of a neighbouring colony (section 5.4 of the paper).
+
+use super::colony::Colonies;
+use super::cost::Evaluator;
+use super::food::{FoodSource, cost_to_beat};
+use super::random::Random;
+use crate::simd::Simd;
+
+/// The neighbours an onlooker may visit, all of the other colour: 1, 3 and 5 pixels along the axes, and a knight's move
+/// away.
+pub const OFFSETS: [(i32, i32); 20] = [
+    (1, 0),
+    (-1, 0),
+    (0, 1),
+    (0, -1),
+    (3, 0),
+    (-3, 0),
+    (0, 3),
+    (0, -3),
+    (5, 0),
+    (-5, 0),
+    (0, 5),
+    (0, -5),
+    (1, 2),
+    (2, 1),
+    (-1, 2),
+    (-2, 1),
+    (1, -2),
+    (2, -1),
+    (-1, -2),
+    (-2, -1),
+];
+
+/// Offers every food source the best plane of a random neighbour of the other colour, transferred to this pixel, and
+/// keeps what is better. A validated plane is rewarded in that comparison (section 5.6).
+#[inline(always)]
+pub fn send<S: Simd>(
+    evaluator: &mut Evaluator<S>,
+    foods: &mut [FoodSource],
+    neighbours: &Colonies,
+    (x, y): (usize, usize),
+    reward: f32,
+    random: &mut Random,
+) {
+    for index in 0..foods.len() {
+        let food = foods[index];
+        let offer = draw_neighbour(neighbours, x, y, random)
+            .and_then(|(dx, dy)| brought(evaluator, neighbours, (x, y), (dx, dy)))
+            .filter(|offer| !is_same_plane(&food, offer));
+        if let Some(offer) = offer {
+            let reward = if offer.validated { reward } else { 0.0 };
+            let bound = cost_to_beat(food.cost, reward);
+            let cost = evaluator.cost(&offer, bound);
+            if cost < bound {
+                foods[index] = FoodSource { cost, ..offer };
+                continue;
+            }
+        }
+        foods[index].trials = food.trials.saturating_add(1);
+    }
+}
+
+/// A random offset to a pixel inside the image: at a border the offset is mirrored, in tiny images there may be none.
+#[inline(always)]
+fn draw_neighbour(colonies: &Colonies, x: usize, y: usize, random: &mut Random) -> Option<(i32, i32)> {
+    let (dx, dy) = OFFSETS[random.below(OFFSETS.len())];
+    let mirrored = |at: usize, offset: i32, size: usize| {
+        let inside = |offset: i32| at.checked_add_signed(offset as isize).is_some_and(|to| to < size);
+        [offset, -offset].into_iter().find(|&offset| inside(offset))
+    };
+    Some((mirrored(x, dx, colonies.width)?, mirrored(y, dy, colonies.height)?))
+}
+
+/// The best plane of the neighbour at this offset, moved to the pixel.
+#[inline(always)]
+fn brought<S: Simd>(
+    evaluator: &Evaluator<S>,
+    neighbours: &Colonies,
+    (x, y): (usize, usize),
+    (dx, dy): (i32, i32),
+) -> Option<FoodSource> {
+    let (nx, ny) = (x.wrapping_add_signed(dx as isize), y.wrapping_add_signed(dy as isize));
+    let best = neighbours.best(nx, ny);
+    // A neighbour that is masked or was never evaluated has nothing to offer.
+    if best.depth <= 0.0 {
+        return None;
+    }
+    let reference = evaluator.reference();
+    let from = reference.ray(nx as f32, ny as f32);
+    let moved = best.transferred(reference, from, evaluator.ray(), (-dx as f32, -dy as f32))?;
+    Some(FoodSource { validated: best.validated, ..moved })
+}
+
+#[inline(always)]
+fn is_same_plane(a: &FoodSource, b: &FoodSource) -> bool {
+    (a.depth - b.depth).abs() <= 1e-6 * b.depth && a.normal == b.normal
+}

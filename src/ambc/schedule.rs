@@ -1,0 +1,340 @@
+//! The search of one reference view for one cycle: bands of rows on the threads, tiles within a band, and the two
+//! colours of the checkerboard in turn.
+
+use super::colony::{Colonies, Offer, best_first, colour};
+use super::cost::{CostRules, Evaluator};
+use super::food::FoodSource;
+use super::random::{Random, stream};
+use super::{employed, onlooker, scout};
+use crate::error::{Error, Result};
+use crate::kernels::Window;
+use crate::maps::Counts;
+use crate::simd::{Level, Simd, Task, dispatch};
+use crate::state::Solution;
+use crate::views::{Reference, ViewRules, ViewSets};
+use rayon::prelude::*;
+
+/// Rows of a band, the unit of work of a thread.
+const BAND_ROWS: usize = 8;
+/// Columns of a tile: with the rows of a band, its colonies and the parts of the sources they reach stay in cache.
+const TILE_COLUMNS: usize = 64;
+
+/// What one search depends on.
+pub struct Search<'a> {
+    /// The view and its sources.
+    pub reference: &'a Reference<'a>,
+    /// Shape and weights of the patches.
+    pub window: &'a Window,
+    /// Aggregation of costs.
+    pub cost_rules: CostRules,
+    /// Pixelwise view selection.
+    pub view_rules: ViewRules,
+    /// Where a solution is wanted.
+    pub mask: Option<&'a [bool]>,
+    /// Solutions to start from, one a pixel; `None` in the very first cycle.
+    pub start: Option<&'a [Solution]>,
+    /// Planes other views offer, one a pixel.
+    pub offers: Option<&'a [Offer]>,
+    /// Food sources of each colony.
+    pub foods: usize,
+    /// Rounds of employed, onlooker and scout bees.
+    pub iterations: u32,
+    /// Trials after which a scout bee may replace a food source.
+    pub trial_limit: u16,
+    /// Fitness reward of validated planes.
+    pub reward: f32,
+    /// Views kept for the whole search; 0 keeps all.
+    pub focused_views: usize,
+    /// Relative spread and tilt of foods around the start; spread 0 draws them at random.
+    pub around_start: (f32, f32),
+    /// Names the random numbers of this view and cycle.
+    pub stream: u64,
+    /// Instruction set.
+    pub level: Level,
+    /// Asked by every band; `true` cancels. May be called from any thread.
+    pub cancelled: &'a (dyn Fn() -> bool + Sync),
+}
+
+/// What one search finds.
+pub struct SearchOutcome {
+    /// The best food source of every pixel; depth 0 where the mask leaves the pixel out.
+    pub best: Vec<FoodSource>,
+    /// The view set each pixel was matched with.
+    pub sets: ViewSets,
+    /// Work done.
+    pub counts: Counts,
+}
+
+impl Search<'_> {
+    /// Runs the search on the current rayon pool.
+    pub fn run(&self) -> Result<SearchOutcome> {
+        dispatch(self.level, SearchTask(self))
+    }
+
+    fn width(&self) -> usize {
+        self.reference.image.width
+    }
+
+    fn height(&self) -> usize {
+        self.reference.image.height
+    }
+
+    fn is_wanted(&self, pixel: usize) -> bool {
+        self.mask.is_none_or(|mask| mask[pixel])
+    }
+}
+
+struct SearchTask<'a>(&'a Search<'a>);
+
+impl Task for SearchTask<'_> {
+    type Output = Result<SearchOutcome>;
+
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let search = self.0;
+        let (width, height) = (search.width(), search.height());
+        let mut colonies =
+            [Colonies::new(width, height, search.foods), Colonies::new(width, height, search.foods)];
+        let mut sets = ViewSets::full(width * height, search.reference.sources.len());
+        let mut focus = sets.clone();
+        let mut counts = initialise(simd, search, &mut colonies, &mut sets, &mut focus)?;
+        for iteration in 0..search.iterations {
+            let [first, second] = &mut colonies;
+            counts += iterate(simd, search, iteration, 0, first, second, &focus)?;
+            counts += iterate(simd, search, iteration, 1, second, first, &focus)?;
+        }
+        counts.samples = counts.ncc_evaluations * search.window.samples();
+        let best = (0..width * height)
+            .map(|pixel| {
+                let (x, y) = (pixel % width, pixel / width);
+                *colonies[colour(x, y)].best(x, y)
+            })
+            .collect();
+        Ok(SearchOutcome { best, sets, counts })
+    }
+}
+
+/// The pixels of a band, tile by tile; `x` and the row within the band.
+fn tiled(width: usize, rows: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..width).step_by(TILE_COLUMNS).flat_map(move |left| {
+        (0..rows).flat_map(move |row| (left..width.min(left + TILE_COLUMNS)).map(move |x| (x, row)))
+    })
+}
+
+/// Adds up what the bands did, unless one was cancelled.
+fn total(bands: impl ParallelIterator<Item = Option<Counts>>) -> Result<Counts> {
+    let sum = |mut a: Counts, b: Counts| {
+        a += b;
+        Some(a)
+    };
+    bands.try_reduce(Counts::default, sum).ok_or(Error::Cancelled)
+}
+
+/// Section 5.1: settles the view set of every pixel, and the part of it to focus on, and fills its colony.
+fn initialise<S: Simd>(
+    simd: S,
+    search: &Search,
+    colonies: &mut [Colonies; 2],
+    sets: &mut ViewSets,
+    focus: &mut ViewSets,
+) -> Result<Counts> {
+    let (width, height) = (search.width(), search.height());
+    let words = sets.words_per_pixel();
+    let band_foods = BAND_ROWS * colonies[0].row_len();
+    let row_foods = colonies[0].row_len();
+    let [first, second] = colonies;
+    let bands = first
+        .foods
+        .par_chunks_mut(band_foods)
+        .zip(second.foods.par_chunks_mut(band_foods))
+        .zip(sets.words_mut().par_chunks_mut(BAND_ROWS * width * words))
+        .zip(focus.words_mut().par_chunks_mut(BAND_ROWS * width * words))
+        .enumerate();
+    total(bands.map(|(band, (((first, second), sets), focus))| {
+        if (search.cancelled)() {
+            return None;
+        }
+        Some(simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut evaluator = Evaluator::new(simd, search.reference, search.window, search.cost_rules);
+                let rows = BAND_ROWS.min(height - band * BAND_ROWS);
+                for (x, row) in tiled(width, rows) {
+                    let y = band * BAND_ROWS + row;
+                    if !search.is_wanted(y * width + x) {
+                        continue;
+                    }
+                    let set = &mut sets[(row * width + x) * words..][..words];
+                    let focus = &mut focus[(row * width + x) * words..][..words];
+                    let foods = if colour(x, y) == 0 { &mut *first } else { &mut *second };
+                    let colony = &mut foods[row * row_foods + x / 2 * search.foods..][..search.foods];
+                    let mut random = Random::new(search.stream, (y * width + x) as u64);
+                    fill_colony(search, &mut evaluator, colony, (set, focus), (x, y), &mut random);
+                }
+                evaluator.counts
+            },
+        ))
+    }))
+}
+
+/// Without a solution: random planes, stratified in inverse depth. With one: it, what other views offer, and planes
+/// around it or random ones.
+#[inline(always)]
+fn fill_colony<S: Simd>(
+    search: &Search,
+    evaluator: &mut Evaluator<S>,
+    colony: &mut [FoodSource],
+    (set, focus): (&mut [u32], &mut [u32]),
+    (x, y): (usize, usize),
+    random: &mut Random,
+) {
+    let reference = search.reference;
+    let pixel = y * search.width() + x;
+    let start = search.start.map(|start| start[pixel]).filter(|start| start.depth > 0.0);
+    if let Some(start) = start {
+        search.view_rules.select(reference, set, (x as f32, y as f32), start.depth, start.normal);
+    }
+    evaluator.go_to(x, y, set);
+    let ray = evaluator.ray();
+    let strata = colony.len() as f32;
+    let mut next = 0;
+    if let Some(start) = start {
+        let food = FoodSource { validated: start.validated, ..FoodSource::new(start.depth, start.normal) };
+        focus.copy_from_slice(set);
+        if search.focused_views > 0 {
+            evaluator.focus(&food, search.focused_views, focus);
+        }
+        colony[0] = food;
+        next = 1;
+    }
+
+    let offer = search.offers.map(|offers| offers[pixel]).filter(|offer| offer.depth > 0.0);
+    if let Some(offer) = offer {
+        colony[next] = FoodSource::new(offer.depth, offer.normal);
+        next += 1;
+    }
+    for index in next..colony.len() {
+        let (spread, tilt) = search.around_start;
+        colony[index] = if start.is_some() && spread > 0.0 {
+            colony[0].nearby(reference, ray, random, spread, tilt)
+        } else {
+            let part = (index as f32 / strata, (index + 1) as f32 / strata);
+            FoodSource::random(reference, ray, random, part)
+        };
+    }
+    for food in colony.iter_mut() {
+        food.cost = evaluator.cost(food, f32::INFINITY);
+    }
+    best_first(colony);
+}
+
+/// One iteration over the pixels of one colour.
+fn iterate<S: Simd>(
+    simd: S,
+    search: &Search,
+    iteration: u32,
+    turn: usize,
+    colonies: &mut Colonies,
+    neighbours: &Colonies,
+    sets: &ViewSets,
+) -> Result<Counts> {
+    let (width, height) = (search.width(), search.height());
+    let row_foods = colonies.row_len();
+    let stream = stream(&[search.stream, 1 + u64::from(iteration)]);
+    let bands = colonies.foods.par_chunks_mut(BAND_ROWS * row_foods).enumerate();
+    total(bands.map(|(band, foods)| {
+        if (search.cancelled)() {
+            return None;
+        }
+        Some(simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut evaluator = Evaluator::new(simd, search.reference, search.window, search.cost_rules);
+                let rows = BAND_ROWS.min(height - band * BAND_ROWS);
+                for (x, row) in tiled(width, rows) {
+                    let y = band * BAND_ROWS + row;
+                    let pixel = y * width + x;
+                    if colour(x, y) != turn || !search.is_wanted(pixel) {
+                        continue;
+                    }
+                    let colony = &mut foods[row * row_foods + x / 2 * search.foods..][..search.foods];
+                    let mut random = Random::new(stream, pixel as u64);
+                    evaluator.go_to(x, y, sets.words_of(pixel));
+                    employed::send(&mut evaluator, colony, &mut random);
+                    onlooker::send(&mut evaluator, colony, neighbours, (x, y), search.reward, &mut random);
+                    best_first(colony);
+                    scout::send(&mut evaluator, colony, search.trial_limit, &mut random);
+                    best_first(colony);
+                }
+                evaluator.counts
+            },
+        ))
+    }))
+}
+
+/// What is known of the final solutions of a view.
+pub struct Assessment {
+    /// Mean `1 - NCC` over the view set of each pixel.
+    pub cost: Vec<f32>,
+    /// Whether each pixel's patch can be matched.
+    pub textured: Vec<bool>,
+    /// The view set of each solution.
+    pub sets: ViewSets,
+    /// Number of views in which the solution was matched, before any falling back to the start set.
+    pub counts: Counts,
+}
+
+/// Settles the view sets of the final solutions and their confidence.
+pub fn assess(search: &Search, solutions: &[Solution]) -> Result<Assessment> {
+    dispatch(search.level, AssessTask { search, solutions })
+}
+
+struct AssessTask<'a> {
+    search: &'a Search<'a>,
+    solutions: &'a [Solution],
+}
+
+impl Task for AssessTask<'_> {
+    type Output = Result<Assessment>;
+
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let AssessTask { search, solutions } = self;
+        let width = search.width();
+        let mut sets = ViewSets::empty(solutions.len(), search.reference.sources.len());
+        let words = sets.words_per_pixel();
+        let mut cost = vec![0.0; solutions.len()];
+        let mut textured = vec![false; solutions.len()];
+        let band = BAND_ROWS * width;
+        let bands = (sets.words_mut().par_chunks_mut(band * words))
+            .zip(cost.par_chunks_mut(band))
+            .zip(textured.par_chunks_mut(band))
+            .enumerate();
+        let mut counts = total(bands.map(|(index, ((sets, cost), textured))| {
+            if (search.cancelled)() {
+                return None;
+            }
+            Some(simd.vectorize(
+                #[inline(always)]
+                || {
+                    let mut evaluator =
+                        Evaluator::new(simd, search.reference, search.window, search.cost_rules);
+                    for place in 0..cost.len() {
+                        let pixel = index * band + place;
+                        let (x, y) = (pixel % width, pixel / width);
+                        let Solution { depth, normal, .. } = solutions[pixel];
+                        if depth <= 0.0 {
+                            continue;
+                        }
+                        let set = &mut sets[place * words..][..words];
+                        search.view_rules.select(search.reference, set, (x as f32, y as f32), depth, normal);
+                        evaluator.go_to(x, y, set);
+                        cost[place] = evaluator.mean_photometric_cost(&FoodSource::new(depth, normal));
+                        textured[place] = evaluator.has_texture();
+                    }
+                    evaluator.counts
+                },
+            ))
+        }))?;
+        counts.samples = counts.ncc_evaluations * search.window.samples();
+        Ok(Assessment { cost, textured, sets, counts })
+    }
+}

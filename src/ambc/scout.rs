@@ -1,0 +1,23 @@
+//! Scout bees: search everywhere (section 5.5 of the paper).
+
+use super::cost::Evaluator;
+use super::food::FoodSource;
+use super::random::Random;
+use crate::simd::Simd;
+
+/// Replaces the stalest food source by a random one when its trial count exceeds the limit; never the best, which
+/// stands first.
+#[inline(always)]
+pub fn send<S: Simd>(
+    evaluator: &mut Evaluator<S>,
+    foods: &mut [FoodSource],
+    trial_limit: u16,
+    random: &mut Random,
+) {
+    let stalest = (1..foods.len()).max_by_key(|&index| (foods[index].trials, std::cmp::Reverse(index)));
+    if let Some(index) = stalest.filter(|&index| foods[index].trials > trial_limit) {
+        let found = FoodSource::random(evaluator.reference(), evaluator.ray(), random, (0.0, 1.0));
+        let cost = evaluator.cost(&found, f32::INFINITY);
+        foods[index] = FoodSource { cost, ..found };
+    }
+}

@@ -1,0 +1,7 @@
+//! The kernels: bilaterally weighted NCC over plane-induced homographies, generic over the instruction set.
+
+mod homography;
+mod ncc;
+
+pub use homography::{PatchHomography, RelativePose, SlantedPlane};
+pub use ncc::{MAX_COST, ReferencePatch, Window, patch_cost};

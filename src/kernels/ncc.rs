@@ -1,0 +1,202 @@
+//! Bilaterally weighted normalised cross-correlation of a reference patch with its image in a source view.
+
+use super::PatchHomography;
+use crate::image::PackedImage;
+use crate::simd::{LANES, Simd};
+
+/// The cost of patches that cannot be compared, and the highest there is.
+pub const MAX_COST: f32 = 2.0;
+
+/// Where a patch is sampled and how samples are weighted; the same for all pixels of a run.
+#[derive(Debug, Clone)]
+pub struct Window {
+    offsets: Vec<Offsets>,
+    /// `exp(-d^2 / (2 sigma^2))` of a difference d of grey values.
+    colour_weights: Box<[f32; 256]>,
+    samples: u64,
+    /// In squared grey values of 0 to 255.
+    min_variance: f32,
+}
+
+/// Eight samples of the window.
+#[derive(Debug, Clone, Copy)]
+struct Offsets {
+    x: [f32; LANES],
+    y: [f32; LANES],
+    /// Spatial weight; 0 in the lanes that only fill up the last vector.
+    weight: [f32; LANES],
+}
+
+impl Window {
+    /// A square of half side `radius` sampled every `step` pixels; sigmas in pixels and in intensities of [0, 1],
+    /// the smallest variance in intensities of [0, 1] too.
+    pub fn new(radius: u32, step: u32, spatial_sigma: f64, colour_sigma: f64, min_variance: f64) -> Window {
+        let radius = radius as i32;
+        let positions = || (-radius..=radius).step_by(step as usize);
+        let samples: Vec<(f32, f32, f32)> = positions()
+            .flat_map(|y| positions().map(move |x| (x, y)))
+            .map(|(x, y)| {
+                let distance = f64::from(x * x + y * y);
+                (x as f32, y as f32, (-distance / (2.0 * spatial_sigma.powi(2))).exp() as f32)
+            })
+            .collect();
+        let offsets = samples
+            .chunks(LANES)
+            .map(|chunk| {
+                let lane = |get: fn(&(f32, f32, f32)) -> f32| {
+                    std::array::from_fn(|lane| chunk.get(lane).map_or(0.0, get))
+                };
+                Offsets { x: lane(|s| s.0), y: lane(|s| s.1), weight: lane(|s| s.2) }
+            })
+            .collect();
+        let colour_weight = |difference: usize| {
+            let difference = difference as f64 / 255.0;
+            (-difference.powi(2) / (2.0 * colour_sigma.powi(2))).exp() as f32
+        };
+        Window {
+            offsets,
+            colour_weights: Box::new(std::array::from_fn(colour_weight)),
+            samples: samples.len() as u64,
+            min_variance: (min_variance * 255.0 * 255.0) as f32,
+        }
+    }
+
+    /// Samples of a patch.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+}
+
+/// The reference's side of the correlation, once a pixel.
+#[derive(Debug, Clone)]
+pub struct ReferencePatch {
+    /// Weights, divided by their sum.
+    weights: Vec<[f32; LANES]>,
+    /// Weights times difference to the mean, divided by the standard deviation.
+    weighted: Vec<[f32; LANES]>,
+    /// Weighted mean of the grey values.
+    mean: f32,
+    /// Weighted variance of the grey values.
+    variance: f32,
+}
+
+impl ReferencePatch {
+    /// Room for a patch of this window.
+    pub fn new(window: &Window) -> ReferencePatch {
+        let zeros = vec![[0.0; LANES]; window.offsets.len()];
+        ReferencePatch { weights: zeros.clone(), weighted: zeros, mean: 0.0, variance: 0.0 }
+    }
+
+    /// Whether the patch varies enough to be matched.
+    pub fn has_texture(&self, window: &Window) -> bool {
+        self.variance >= window.min_variance
+    }
+
+    /// Samples the patch around a pixel. What lies outside the image weighs nothing.
+    #[inline(always)]
+    pub fn sample<S: Simd>(&mut self, simd: S, window: &Window, image: &PackedImage, x: usize, y: usize) {
+        let (width, height) = (image.width, image.height);
+        let centre = simd.splat((image.words[y * width + x] & 0xff) as f32);
+        let (x, y) = (simd.splat(x as f32), simd.splat(y as f32));
+        let (right, bottom) = (simd.splat((width - 1) as f32), simd.splat((height - 1) as f32));
+        let zero = simd.splat(0.0);
+        let (mut total, mut sum) = (zero, zero);
+        for (index, offsets) in window.offsets.iter().enumerate() {
+            let (sample_x, sample_y) =
+                (simd.add(x, simd.load(&offsets.x)), simd.add(y, simd.load(&offsets.y)));
+            let inside_x = simd.min(simd.max(sample_x, zero), right);
+            let inside_y = simd.min(simd.max(sample_y, zero), bottom);
+            let [grey, ..] = simd.gather_bytes(&image.words, width, inside_x, inside_y);
+            let difference = simd.max(simd.sub(grey, centre), simd.sub(centre, grey));
+            let weight =
+                simd.mul(simd.load(&offsets.weight), simd.look_up(&window.colour_weights, difference));
+            // 0 where clamping moved the sample by a pixel or more, 1 where it did not.
+            let moved_x = simd.max(simd.sub(inside_x, sample_x), simd.sub(sample_x, inside_x));
+            let moved_y = simd.max(simd.sub(inside_y, sample_y), simd.sub(sample_y, inside_y));
+            let moved = simd.min(simd.add(moved_x, moved_y), simd.splat(1.0));
+            let weight = simd.mul(weight, simd.sub(simd.splat(1.0), moved));
+            total = simd.add(total, weight);
+            sum = simd.mul_add(weight, grey, sum);
+            self.weights[index] = simd.store(weight);
+            self.weighted[index] = simd.store(grey);
+        }
+        // The centre pixel's own neighbours weigh something unless the window is wider than the image.
+        let scale = 1.0 / simd.sum(total).max(f32::MIN_POSITIVE);
+        self.mean = simd.sum(sum) * scale;
+        self.normalise(simd, scale);
+    }
+
+    #[inline(always)]
+    fn normalise<S: Simd>(&mut self, simd: S, scale: f32) {
+        let (mean, scale) = (simd.splat(self.mean), simd.splat(scale));
+        let mut squares = simd.splat(0.0);
+        for (weight, weighted) in self.weights.iter_mut().zip(&mut self.weighted) {
+            let difference = simd.sub(simd.load(weighted), mean);
+            let share = simd.mul(simd.load(weight), scale);
+            let product = simd.mul(share, difference);
+            squares = simd.mul_add(product, difference, squares);
+            *weight = simd.store(share);
+            *weighted = simd.store(product);
+        }
+        self.variance = simd.sum(squares);
+        let inverse_deviation = simd.splat(1.0 / self.variance.max(f32::MIN_POSITIVE).sqrt());
+        for weighted in &mut self.weighted {
+            *weighted = simd.store(simd.mul(simd.load(weighted), inverse_deviation));
+        }
+    }
+}
+
+/// `1 - NCC` of the patch and its image in a source view, clamped to [0, 2]; [`MAX_COST`] when either side has no
+/// texture. Samples beyond the source's border repeat it.
+#[inline(always)]
+pub fn patch_cost<S: Simd>(
+    simd: S,
+    window: &Window,
+    patch: &ReferencePatch,
+    source: &PackedImage,
+    homography: &PatchHomography,
+) -> f32 {
+    if !patch.has_texture(window) {
+        return MAX_COST;
+    }
+    let (zero, one) = (simd.splat(0.0), simd.splat(1.0));
+    let (right, bottom) = (simd.splat((source.width - 1) as f32), simd.splat((source.height - 1) as f32));
+    let PatchHomography { centre, along_x, along_y } = homography;
+    let (centre_x, centre_y, centre_z) = (simd.splat(centre.x), simd.splat(centre.y), simd.splat(centre.z));
+    let (xx, xy, xz) = (simd.splat(along_x.x), simd.splat(along_x.y), simd.splat(along_x.z));
+    let (yx, yy, yz) = (simd.splat(along_y.x), simd.splat(along_y.y), simd.splat(along_y.z));
+    let mean = simd.splat(patch.mean);
+    let (mut sum, mut squares, mut products) = (zero, zero, zero);
+    for (offsets, (weight, weighted)) in window.offsets.iter().zip(patch.weights.iter().zip(&patch.weighted))
+    {
+        let (dx, dy) = (simd.load(&offsets.x), simd.load(&offsets.y));
+        let z = simd.mul_add(dy, yz, simd.mul_add(dx, xz, centre_z));
+        let inverse_z = simd.div(one, z);
+        let x = simd.mul(simd.mul_add(dy, yx, simd.mul_add(dx, xx, centre_x)), inverse_z);
+        let y = simd.mul(simd.mul_add(dy, yy, simd.mul_add(dx, xy, centre_y)), inverse_z);
+        // max gives 0 for what is not a number: samples on the source camera's plane.
+        let x = simd.min(simd.max(x, zero), right);
+        let y = simd.min(simd.max(y, zero), bottom);
+        let (column, row) = (simd.whole(x), simd.whole(y));
+        let (fraction_x, fraction_y) = (simd.sub(x, column), simd.sub(y, row));
+        let [top_left, top_right, bottom_left, bottom_right] =
+            simd.gather_bytes(&source.words, source.width, column, row);
+        let top = simd.mul_add(fraction_x, simd.sub(top_right, top_left), top_left);
+        let low = simd.mul_add(fraction_x, simd.sub(bottom_right, bottom_left), bottom_left);
+        let grey = simd.mul_add(fraction_y, simd.sub(low, top), top);
+        // About the reference's mean: single-pass sums in f32 lose digits in low contrast.
+        let difference = simd.sub(grey, mean);
+        let share = simd.mul(simd.load(weight), difference);
+        sum = simd.add(sum, share);
+        squares = simd.mul_add(share, difference, squares);
+        products = simd.mul_add(simd.load(weighted), difference, products);
+    }
+    let mean = simd.sum(sum);
+    let variance = simd.sum(squares) - mean * mean;
+    // Written so that a variance that is not a number has no texture.
+    if variance >= window.min_variance {
+        (1.0 - simd.sum(products) / variance.sqrt()).clamp(0.0, MAX_COST)
+    } else {
+        MAX_COST
+    }
+}

@@ -1,0 +1,85 @@
+//! One lane at a time: what the other back-ends are tested against.
+
+use super::{LANES, Level, Simd};
+use std::array::from_fn;
+
+/// The scalar back-end.
+#[derive(Debug, Clone, Copy)]
+pub struct Scalar;
+
+impl Simd for Scalar {
+    const LEVEL: Level = Level::Scalar;
+    type F32 = [f32; LANES];
+
+    #[inline(always)]
+    fn splat(self, value: f32) -> Self::F32 {
+        [value; LANES]
+    }
+
+    #[inline(always)]
+    fn load(self, lanes: &[f32; LANES]) -> Self::F32 {
+        *lanes
+    }
+
+    #[inline(always)]
+    fn store(self, lanes: Self::F32) -> [f32; LANES] {
+        lanes
+    }
+
+    #[inline(always)]
+    fn add(self, a: Self::F32, b: Self::F32) -> Self::F32 {
+        from_fn(|lane| a[lane] + b[lane])
+    }
+
+    #[inline(always)]
+    fn sub(self, a: Self::F32, b: Self::F32) -> Self::F32 {
+        from_fn(|lane| a[lane] - b[lane])
+    }
+
+    #[inline(always)]
+    fn mul(self, a: Self::F32, b: Self::F32) -> Self::F32 {
+        from_fn(|lane| a[lane] * b[lane])
+    }
+
+    #[inline(always)]
+    fn div(self, a: Self::F32, b: Self::F32) -> Self::F32 {
+        from_fn(|lane| a[lane] / b[lane])
+    }
+
+    #[inline(always)]
+    fn max(self, a: Self::F32, b: Self::F32) -> Self::F32 {
+        from_fn(|lane| if a[lane] > b[lane] { a[lane] } else { b[lane] })
+    }
+
+    #[inline(always)]
+    fn min(self, a: Self::F32, b: Self::F32) -> Self::F32 {
+        from_fn(|lane| if a[lane] < b[lane] { a[lane] } else { b[lane] })
+    }
+
+    #[inline(always)]
+    fn whole(self, a: Self::F32) -> Self::F32 {
+        from_fn(|lane| a[lane] as i32 as f32)
+    }
+
+    #[inline(always)]
+    fn gather_bytes(self, words: &[u32], stride: usize, x: Self::F32, y: Self::F32) -> [Self::F32; 4] {
+        let word = |lane: usize| words[(y[lane] as usize * stride + x[lane] as usize).min(words.len() - 1)];
+        let bytes: [[u8; 4]; LANES] = from_fn(|lane| word(lane).to_le_bytes());
+        from_fn(|tap| from_fn(|lane| f32::from(bytes[lane][tap])))
+    }
+
+    #[inline(always)]
+    fn look_up(self, table: &[f32; 256], a: Self::F32) -> Self::F32 {
+        from_fn(|lane| table[usize::from(a[lane] as u8)])
+    }
+
+    #[inline(always)]
+    fn sum(self, l: Self::F32) -> f32 {
+        ((l[0] + l[4]) + (l[2] + l[6])) + ((l[1] + l[5]) + (l[3] + l[7]))
+    }
+
+    #[inline(always)]
+    fn vectorize<R>(self, f: impl FnOnce() -> R) -> R {
+        f()
+    }
+}

@@ -1,0 +1,135 @@
+//! AVX2 by way of `core::arch`: `wide` does not become AVX2 code inside a `target_feature` function.
+#![allow(unsafe_code)]
+
+use super::{LANES, Level, Simd};
+use core::arch::x86_64::*;
+
+/// The AVX2 back-end. Owning one proves that the machine has AVX2.
+#[derive(Debug, Clone, Copy)]
+pub struct X86V3(());
+
+impl X86V3 {
+    /// The token, on a machine that has AVX2.
+    pub fn new() -> Option<X86V3> {
+        is_x86_feature_detected!("avx2").then_some(X86V3(()))
+    }
+}
+
+// Every `unsafe` block below calls AVX or AVX2 intrinsics, whose only demand is that the machine has them.
+// SAFETY (all of them): `self` exists, so `X86V3::new` has seen AVX2. What else a block needs is said there.
+impl Simd for X86V3 {
+    const LEVEL: Level = Level::X86V3;
+    type F32 = __m256;
+
+    #[inline(always)]
+    fn splat(self, value: f32) -> __m256 {
+        // SAFETY: AVX is there.
+        unsafe { _mm256_set1_ps(value) }
+    }
+
+    #[inline(always)]
+    fn load(self, lanes: &[f32; LANES]) -> __m256 {
+        // SAFETY: AVX is there, and the array holds the eight f32 that an unaligned load reads.
+        unsafe { _mm256_loadu_ps(lanes.as_ptr()) }
+    }
+
+    #[inline(always)]
+    fn store(self, lanes: __m256) -> [f32; LANES] {
+        let mut array = [0.0; LANES];
+        // SAFETY: AVX is there, and the array has room for the eight f32 that an unaligned store writes.
+        unsafe { _mm256_storeu_ps(array.as_mut_ptr(), lanes) };
+        array
+    }
+
+    #[inline(always)]
+    fn add(self, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: AVX is there.
+        unsafe { _mm256_add_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn sub(self, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: AVX is there.
+        unsafe { _mm256_sub_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn mul(self, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: AVX is there.
+        unsafe { _mm256_mul_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn div(self, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: AVX is there.
+        unsafe { _mm256_div_ps(a, b) }
+    }
+
+    // The instruction itself gives the second operand where a lane is not a number.
+    #[inline(always)]
+    fn max(self, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: AVX is there.
+        unsafe { _mm256_max_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn min(self, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: AVX is there.
+        unsafe { _mm256_min_ps(a, b) }
+    }
+
+    #[inline(always)]
+    fn whole(self, a: __m256) -> __m256 {
+        // SAFETY: AVX is there.
+        unsafe { _mm256_round_ps::<{ _MM_FROUND_TO_ZERO | _MM_FROUND_NO_EXC }>(a) }
+    }
+
+    #[inline(always)]
+    fn gather_bytes(self, words: &[u32], stride: usize, x: __m256, y: __m256) -> [__m256; 4] {
+        assert!(!words.is_empty() && words.len() <= i32::MAX as usize);
+        // SAFETY: AVX2 is there. Each index is clamped, as unsigned, to the last word, and the words fit an i32 as the
+        // assertion says, so every lane reads inside the slice.
+        unsafe {
+            let row = _mm256_mullo_epi32(_mm256_cvttps_epi32(y), _mm256_set1_epi32(stride as i32));
+            let index = _mm256_add_epi32(row, _mm256_cvttps_epi32(x));
+            let index = _mm256_min_epu32(index, _mm256_set1_epi32((words.len() - 1) as i32));
+            let word = _mm256_i32gather_epi32::<4>(words.as_ptr().cast(), index);
+            let byte = _mm256_set1_epi32(0xff);
+            [
+                _mm256_cvtepi32_ps(_mm256_and_si256(word, byte)),
+                _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32::<8>(word), byte)),
+                _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32::<16>(word), byte)),
+                _mm256_cvtepi32_ps(_mm256_srli_epi32::<24>(word)),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    fn look_up(self, table: &[f32; 256], a: __m256) -> __m256 {
+        // SAFETY: AVX2 is there, and every index is reduced to the table's 256 entries.
+        unsafe {
+            let index = _mm256_and_si256(_mm256_cvttps_epi32(a), _mm256_set1_epi32(0xff));
+            _mm256_i32gather_ps::<4>(table.as_ptr(), index)
+        }
+    }
+
+    #[inline(always)]
+    fn sum(self, a: __m256) -> f32 {
+        // SAFETY: AVX is there.
+        unsafe {
+            let four = _mm_add_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps::<1>(a));
+            let two = _mm_add_ps(four, _mm_movehl_ps(four, four));
+            _mm_cvtss_f32(_mm_add_ss(two, _mm_shuffle_ps::<1>(two, two)))
+        }
+    }
+
+    #[inline(always)]
+    fn vectorize<R>(self, f: impl FnOnce() -> R) -> R {
+        #[target_feature(enable = "avx2")]
+        fn with_avx2<R>(f: impl FnOnce() -> R) -> R {
+            f()
+        }
+        // SAFETY: AVX2 is there.
+        unsafe { with_avx2(f) }
+    }
+}

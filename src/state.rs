@@ -1,0 +1,86 @@
+//! What a view keeps between cycles: its solutions and what is known of them. Colonies live for one search only.
+
+use crate::camera::Camera;
+use crate::kernels::SlantedPlane;
+use crate::scene::DepthRange;
+use crate::views::ViewSets;
+use glam::{DVec2, Vec3};
+use rayon::prelude::*;
+
+/// A pixel's solution.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Solution {
+    /// Depth at the pixel, 0 where there is none.
+    pub depth: f32,
+    /// Unit normal in the camera frame, facing the camera.
+    pub normal: Vec3,
+    /// Source views the last check found consistent with it.
+    pub consistent: u8,
+    /// Whether that check validated it.
+    pub validated: bool,
+}
+
+/// The solutions of one view on one scale.
+#[derive(Debug, Clone, Default)]
+pub struct ViewState {
+    /// Row by row.
+    pub solutions: Vec<Solution>,
+    /// Aggregated cost of each solution.
+    pub cost: Vec<f32>,
+    /// The view set each was matched with.
+    pub sets: ViewSets,
+    /// The validated solutions as planes, inverse depth 0 elsewhere: what other views look up.
+    pub surface: Vec<SlantedPlane>,
+}
+
+impl ViewState {
+    /// Marks each solution by what the check says of it, and brings the surface up to date.
+    pub fn mark(&mut self, camera: &Camera, consistent: &[(u8, bool)]) {
+        for (solution, &(count, validated)) in self.solutions.iter_mut().zip(consistent) {
+            solution.consistent = count;
+            solution.validated = validated;
+        }
+        self.surface = surface(camera, &self.solutions);
+    }
+
+    /// Number of validated solutions.
+    pub fn validated(&self) -> u64 {
+        self.solutions.iter().filter(|solution| solution.validated).count() as u64
+    }
+
+    /// The state handed up to the next finer scale: each fine pixel gets the plane of its coarse pixel.
+    pub fn refined(&self, coarse: &Camera, fine: &Camera, range: DepthRange) -> ViewState {
+        let (width, coarse_width) = (fine.width as usize, coarse.width as usize);
+        let refine = |pixel: usize| {
+            let (x, y) = (pixel % width, pixel / width);
+            let source =
+                (y / 2).min(coarse.height as usize - 1) * coarse_width + (x / 2).min(coarse_width - 1);
+            let solution = self.solutions[source];
+            if solution.depth <= 0.0 {
+                return solution;
+            }
+            let centre = DVec2::new((source % coarse_width) as f64, (source / coarse_width) as f64);
+            let normal = solution.normal.as_dvec3();
+            let on_plane = normal.dot(coarse.ray(centre)) * f64::from(solution.depth);
+            let depth = on_plane / normal.dot(fine.ray(DVec2::new(x as f64, y as f64)));
+            let is_usable = depth >= range.near && depth <= range.far;
+            Solution { depth: if is_usable { depth as f32 } else { solution.depth }, ..solution }
+        };
+        let solutions: Vec<Solution> = (0..fine.pixels()).into_par_iter().map(refine).collect();
+        let surface = surface(fine, &solutions);
+        ViewState { solutions, surface, ..ViewState::default() }
+    }
+}
+
+fn surface(camera: &Camera, solutions: &[Solution]) -> Vec<SlantedPlane> {
+    let width = camera.width as usize;
+    let inverse_focal = ((1.0 / camera.fx) as f32, (1.0 / camera.fy) as f32);
+    let plane = |(pixel, solution): (usize, &Solution)| {
+        if !solution.validated {
+            return SlantedPlane { inverse_depth: 0.0, slope_x: 0.0, slope_y: 0.0 };
+        }
+        let ray = camera.ray(DVec2::new((pixel % width) as f64, (pixel / width) as f64)).as_vec3();
+        SlantedPlane::new(solution.depth, solution.normal, ray, inverse_focal)
+    };
+    solutions.par_iter().enumerate().map(plane).collect()
+}

@@ -1,0 +1,115 @@
+//! The start set: views whose triangulation angle with the reference view lies in a band.
+
+use crate::options::Options;
+use crate::scene::Scene;
+use glam::{DVec2, DVec3};
+use std::collections::HashMap;
+
+/// The source views of every view.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct SourceLists {
+    /// For each view the indices of its source views, smallest triangulation angle first.
+    pub lists: Vec<Vec<u32>>,
+    /// Views for which the band had to be left, and views without any source, in sentences.
+    pub warnings: Vec<String>,
+}
+
+/// Fewer shared points than this say little: a false match has any angle.
+const MIN_SHARED_POINTS: usize = 3;
+/// The percentile of the angles at shared points that stands for the pair.
+const ANGLE_PERCENTILE: f64 = 0.75;
+/// Sources taken from outside the band when none lies in it: validation needs at least two.
+const FALLBACK_SOURCES: usize = 2;
+
+/// The start set of every view: all views that overlap with it and whose triangulation angle lies in the band of the
+/// options, or the ones nearest to the band when none does.
+pub fn source_lists(scene: &Scene, options: &Options) -> SourceLists {
+    let shared = shared_angles(scene);
+    let mut found = SourceLists::default();
+    for (index, view) in scene.views().iter().enumerate() {
+        let mut angles: Vec<(f64, u32)> = (0..scene.views().len())
+            .filter(|&other| other != index)
+            .filter_map(|other| {
+                let points = shared.get(&(index.min(other), index.max(other)));
+                let angle = match points {
+                    Some(angles) if angles.len() >= MIN_SHARED_POINTS => percentile(angles.clone()),
+                    _ => percentile(angles_at_middle_depth(scene, index, other)),
+                };
+                angle.map(|angle| (angle, other as u32))
+            })
+            .collect();
+        angles.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let (min, max) = options.triangulation_angle;
+        let in_band = |angle: f64| (min..=max).contains(&angle);
+        let mut list: Vec<u32> = angles.iter().filter(|a| in_band(a.0)).map(|a| a.1).collect();
+        if list.is_empty() {
+            let distance = |angle: f64| (min - angle).max(angle - max);
+            angles.sort_by(|a, b| distance(a.0).total_cmp(&distance(b.0)).then(a.1.cmp(&b.1)));
+            angles.truncate(FALLBACK_SOURCES);
+            found.warnings.push(describe_fallback(&view.name, &angles, options));
+            list = angles.iter().map(|a| a.1).collect();
+        }
+        if options.max_sources > 0 {
+            list.truncate(options.max_sources as usize);
+        }
+        found.lists.push(list);
+    }
+    found
+}
+
+fn describe_fallback(name: &str, taken: &[(f64, u32)], options: &Options) -> String {
+    let (min, max) = options.triangulation_angle;
+    if taken.is_empty() {
+        return format!("{name} overlaps with no other view: no depth can be found for it");
+    }
+    let angles: Vec<String> = taken.iter().map(|(angle, _)| format!("{angle:.1}")).collect();
+    format!(
+        "{name} has no source view with a triangulation angle of {min} to {max} degrees; the nearest were taken, at {} \
+         degrees",
+        angles.join(" and ")
+    )
+}
+
+/// For each pair of views the angles, in degrees, at the sparse points both saw.
+fn shared_angles(scene: &Scene) -> HashMap<(usize, usize), Vec<f64>> {
+    let centres: Vec<DVec3> = scene.views().iter().map(|view| view.camera.centre()).collect();
+    let mut shared: HashMap<(usize, usize), Vec<f64>> = HashMap::new();
+    for point in scene.points() {
+        let mut views: Vec<usize> = point.views.iter().map(|&view| view as usize).collect();
+        views.sort_unstable();
+        views.dedup();
+        for (place, &a) in views.iter().enumerate() {
+            for &b in &views[place + 1..] {
+                let angle = (centres[a] - point.position).angle_between(centres[b] - point.position);
+                shared.entry((a, b)).or_default().push(angle.to_degrees());
+            }
+        }
+    }
+    shared
+}
+
+/// Angles, in degrees, at points on rays of the reference view in the middle of its inverse depths that the other
+/// view has in its image. Never between optical axes: parallel cameras would get none.
+fn angles_at_middle_depth(scene: &Scene, reference: usize, other: usize) -> Vec<f64> {
+    let camera = &scene.views()[reference].camera;
+    let other = &scene.views()[other].camera;
+    let range = scene.depth_range(reference);
+    let depth = 2.0 / (1.0 / range.near + 1.0 / range.far);
+    let steps = [0.1, 0.3, 0.5, 0.7, 0.9];
+    let mut angles = Vec::new();
+    for pixel in steps.iter().flat_map(|y| steps.map(|x| DVec2::new(x, *y))) {
+        let size = DVec2::new(f64::from(camera.width), f64::from(camera.height));
+        let point = camera.unproject(pixel * size, depth);
+        let seen = other.project(point).and_then(|(pixel, _)| other.nearest_pixel(pixel));
+        if seen.is_some() {
+            angles.push((camera.centre() - point).angle_between(other.centre() - point).to_degrees());
+        }
+    }
+    angles
+}
+
+fn percentile(mut angles: Vec<f64>) -> Option<f64> {
+    angles.sort_by(f64::total_cmp);
+    let last = angles.len().checked_sub(1)?;
+    Some(angles[(last as f64 * ANGLE_PERCENTILE).round() as usize])
+}

@@ -1,0 +1,123 @@
+//! A reference view and its source views on one scale, in f32 and in the reference camera's frame.
+
+use crate::camera::Camera;
+use crate::image::PackedImage;
+use crate::kernels::{RelativePose, SlantedPlane};
+use crate::scene::DepthRange;
+use glam::{Mat3, Vec3};
+
+/// The view whose maps are estimated.
+#[derive(Debug, Clone)]
+pub struct Reference<'a> {
+    /// Its grey image.
+    pub image: &'a PackedImage,
+    /// 1 / fx and 1 / fy.
+    pub inverse_focal: (f32, f32),
+    /// cx and cy.
+    pub principal: (f32, f32),
+    /// Smallest depth searched.
+    pub near: f32,
+    /// Largest depth searched.
+    pub far: f32,
+    /// Its source views, in the order of its list.
+    pub sources: Vec<Source<'a>>,
+}
+
+/// A view the reference is matched with.
+#[derive(Debug, Clone)]
+pub struct Source<'a> {
+    /// Its grey image.
+    pub image: &'a PackedImage,
+    /// Where it stands, in pixels.
+    pub pose: RelativePose,
+    /// Rotation from the reference camera's frame to its own.
+    pub rotation: Mat3,
+    /// Its centre of projection in the reference camera's frame.
+    pub centre: Vec3,
+    /// Its validated solutions, one a pixel, with inverse depth 0 where there is none.
+    pub surface: &'a [SlantedPlane],
+}
+
+impl<'a> Reference<'a> {
+    /// A reference view without sources yet.
+    pub fn new(camera: &Camera, image: &'a PackedImage, range: DepthRange) -> Reference<'a> {
+        Reference {
+            image,
+            inverse_focal: ((1.0 / camera.fx) as f32, (1.0 / camera.fy) as f32),
+            principal: (camera.cx as f32, camera.cy as f32),
+            near: range.near as f32,
+            far: range.far as f32,
+            sources: Vec::new(),
+        }
+    }
+
+    /// `K^-1 [x y 1]`.
+    #[inline(always)]
+    pub fn ray(&self, x: f32, y: f32) -> Vec3 {
+        Vec3::new(
+            (x - self.principal.0) * self.inverse_focal.0,
+            (y - self.principal.1) * self.inverse_focal.1,
+            1.0,
+        )
+    }
+}
+
+impl<'a> Source<'a> {
+    /// The source with this camera, seen from the reference camera.
+    pub fn new(
+        reference: &Camera,
+        camera: &Camera,
+        image: &'a PackedImage,
+        surface: &'a [SlantedPlane],
+    ) -> Source<'a> {
+        let rotation = camera.rotation * reference.rotation.transpose();
+        let centre = rotation.transpose() * (rotation * reference.translation - camera.translation);
+        Source {
+            image,
+            pose: RelativePose::new(reference, camera),
+            rotation: rotation.as_mat3(),
+            centre: centre.as_vec3(),
+            surface,
+        }
+    }
+
+    /// The validated solution at the pixel nearest to `(x, y)`, and the inverse depth of its plane exactly there;
+    /// `None` where there is none. `(x, y)` must lie inside the image.
+    #[inline(always)]
+    pub fn validated_at(&self, x: f32, y: f32) -> Option<ValidatedDepth> {
+        let (column, row) = ((x + 0.5) as usize, (y + 0.5) as usize);
+        let plane = self.surface.get(row * self.image.width + column)?;
+        let exact = plane.inverse_depth_at(x - column as f32, y - row as f32);
+        (plane.inverse_depth > 0.0).then_some(ValidatedDepth { nearest: plane.inverse_depth, exact })
+    }
+}
+
+/// A source's validated solution where a point projects, as inverse depths.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ValidatedDepth {
+    /// At the nearest pixel.
+    pub nearest: f32,
+    /// Where the plane of that pixel meets the point's ray.
+    pub exact: f32,
+}
+
+/// A projected point: column, row and depth in the source view.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Projection {
+    /// Column in pixels.
+    pub x: f32,
+    /// Row in pixels.
+    pub y: f32,
+}
+
+impl Source<'_> {
+    /// The pixel a homogeneous point falls on, `None` behind the camera or outside the image.
+    #[inline(always)]
+    pub fn project(&self, point: Vec3) -> Option<Projection> {
+        let inverse = 1.0 / point.z;
+        let (x, y) = (point.x * inverse, point.y * inverse);
+        let (right, bottom) = ((self.image.width - 1) as f32, (self.image.height - 1) as f32);
+        let inside = point.z > 0.0 && x >= 0.0 && y >= 0.0 && x <= right && y <= bottom;
+        inside.then_some(Projection { x, y })
+    }
+}
