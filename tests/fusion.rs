@@ -77,7 +77,7 @@ fn exact_maps_become_points_on_the_surface() {
 fn the_cloud_keeps_about_one_point_for_each_surface_pixel() {
     let made = procedural::plane_and_sphere();
     let cloud = fuse_maps(&made, &made.truth, OPTIONS);
-    let middle = &made.views[3].camera;
+    let middle = &made.views[procedural::MIDDLE].camera;
     let mut points_at = vec![0; middle.pixels()];
     for &point in &cloud.positions {
         let point = DVec3::from_array(point);
@@ -85,7 +85,7 @@ fn the_cloud_keeps_about_one_point_for_each_surface_pixel() {
         else {
             continue;
         };
-        if made.is_visible(point, 3) {
+        if made.is_visible(point, procedural::MIDDLE) {
             points_at[(row * middle.width + column) as usize] += 1;
         }
     }
@@ -134,9 +134,9 @@ fn haunted(ghosts: usize) -> (Procedural, Vec<Maps>, f64) {
     let wall = procedural::wall(Texture::Noise);
     let depth = -0.6;
     let ghost = Shape::upright(DVec3::Z * depth, 0.0, DVec2::splat(0.4));
-    let cameras = procedural::arc();
-    let with = Procedural::new(vec![Surface { shape: ghost, texture: Texture::Noise }, wall], &cameras);
-    let without = Procedural::new(vec![wall], &cameras);
+    let cameras = &procedural::cameras()[..7];
+    let with = Procedural::new(vec![Surface { shape: ghost, texture: Texture::Noise }, wall], cameras);
+    let without = Procedural::new(vec![wall], cameras);
     let maps = (0..7).map(|view| if view < ghosts { &with } else { &without }.truth[view].clone()).collect();
     (without, maps, depth)
 }
@@ -165,7 +165,8 @@ fn too_few_agreeing_views_make_no_points() {
 #[test]
 fn only_overlapping_views_count() {
     let made = procedural::plane_and_sphere();
-    let overlap: Vec<Vec<u32>> = all_others(7).into_iter().map(|others| others[..2].to_vec()).collect();
+    let overlap: Vec<Vec<u32>> =
+        all_others(made.views.len()).into_iter().map(|others| others[..2].to_vec()).collect();
     let cloud = fuse(&fusion_views(&made, &made.truth, &overlap), &OPTIONS, &ignore_progress).unwrap();
     assert!(cloud.positions.is_empty());
     let options = FusionOptions { min_views: 2, ..OPTIONS };
@@ -220,7 +221,7 @@ fn colours_are_the_pictures_at_the_point_and_grey_without() {
     }
     assert!(difference / (cloud.positions.len() as f64) < 12.0, "{difference}");
 
-    let overlap = all_others(7);
+    let overlap = all_others(made.views.len());
     let mut views = fusion_views(&made, &made.truth, &overlap);
     views.iter_mut().for_each(|view| view.picture = None);
     let cloud = fuse(&views, &OPTIONS, &ignore_progress).unwrap();
@@ -313,7 +314,7 @@ fn far_from_the_world_s_origin_nothing_is_lost() {
 #[test]
 fn the_hook_follows_the_fusion_and_can_stop_it() {
     let made = procedural::occluding_post();
-    let overlap = all_others(7);
+    let overlap = all_others(made.views.len());
     let views = fusion_views(&made, &made.truth, &overlap);
     let seen = Mutex::new(Vec::new());
     let watch = |progress: &Progress| {
@@ -322,7 +323,7 @@ fn the_hook_follows_the_fusion_and_can_stop_it() {
     };
     fuse(&views, &OPTIONS, &watch).unwrap();
     let seen = seen.into_inner().unwrap();
-    assert!(seen.iter().all(|progress| progress.phase == Phase::Fusion && progress.views == 7));
+    assert!(seen.iter().all(|progress| progress.phase == Phase::Fusion && progress.views == 9));
     assert!(seen.windows(2).all(|pair| pair[0].done <= pair[1].done && pair[0].view <= pair[1].view));
     assert_eq!((seen[0].done, seen[seen.len() - 1].done), (0.0, 1.0));
 
@@ -373,11 +374,11 @@ fn a_pixel_that_became_part_of_a_point_starts_none() {
     let camera = &made.views[0].camera;
     let seen = (0..camera.pixels()).filter(|&pixel| {
         let position = camera.unproject(pixel_centre(camera, pixel), f64::from(made.truth[0].depth[pixel]));
-        (1..7).filter(|&view| made.is_visible(before(position.to_array(), camera), view)).count() >= 3
+        (1..9).filter(|&view| made.is_visible(before(position.to_array(), camera), view)).count() >= 3
     });
     let seen = seen.count();
     assert!(first as f64 > 0.95 * seen as f64, "{first} of {seen}");
-    for view in 2..7 {
+    for view in 2..9 {
         assert!(starts(view) * 2 < first, "view {view} starts {} points", starts(view));
     }
 }

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::procedural::{self, Procedural, Texture, pixel_centre};
+use common::procedural::{self, MIDDLE, Procedural, Texture, pixel_centre};
 use glam::DVec3;
 use skep::View;
 use skep::camera::Plane;
@@ -108,18 +108,19 @@ fn many_pairs_of_views_see_the_scene_under_a_good_angle() {
 fn the_panel_has_one_grey_value_and_no_sparse_points() {
     let made = procedural::textureless_panel();
     let mut panel = 0;
-    for (pixel, &grey) in made.views[3].picture.grey().iter().enumerate() {
-        if made.hit(3, pixel).unwrap().surface == procedural::PANEL && !is_on_edge(&made, 3, pixel) {
+    for (pixel, &grey) in made.views[MIDDLE].picture.grey().iter().enumerate() {
+        if made.hit(MIDDLE, pixel).unwrap().surface == procedural::PANEL && !is_on_edge(&made, MIDDLE, pixel)
+        {
             assert_eq!(grey, 128);
             panel += 1;
         }
     }
     assert!((400..3000).contains(&panel), "{panel} pixels of panel");
     let on_panel = |point: DVec3| {
-        let (pixel, _) = made.views[3].camera.project(point).unwrap();
-        made.views[3].camera.nearest_pixel(pixel).is_some_and(|(column, row)| {
-            let pixel = (row * made.views[3].camera.width + column) as usize;
-            made.hit(3, pixel).unwrap().surface == procedural::PANEL && !is_on_edge(&made, 3, pixel)
+        let (pixel, _) = made.views[MIDDLE].camera.project(point).unwrap();
+        made.views[MIDDLE].camera.nearest_pixel(pixel).is_some_and(|(column, row)| {
+            let pixel = (row * made.views[MIDDLE].camera.width + column) as usize;
+            made.hit(MIDDLE, pixel).unwrap().surface == procedural::PANEL && !is_on_edge(&made, MIDDLE, pixel)
         })
     };
     assert!(!made.points.iter().any(|point| on_panel(point.position)));

@@ -216,27 +216,30 @@ pub fn looking_at(position: DVec3, target: DVec3, (width, height): (u32, u32), f
     }
 }
 
-/// Seven cameras around the origin, 5.5 degrees apart from left to right, up and down in turn.
-pub fn arc() -> Vec<Camera> {
-    let camera = |index: i32| {
-        let yaw = (5.5 * f64::from(index - 3)).to_radians();
-        let pitch = if index % 2 == 0 { 3f64 } else { -3.0 }.to_radians();
+/// Nine cameras around the origin in three rows: most pairs see it under an angle of 10 to 30 degrees.
+pub fn cameras() -> Vec<Camera> {
+    let camera = |index: u32| {
+        let yaw = (14.0 * (f64::from(index % 3) - 1.0)).to_radians();
+        let pitch = (12.0 * (f64::from(index / 3) - 1.0)).to_radians();
         let towards = DVec3::new(yaw.sin() * pitch.cos(), pitch.sin(), -yaw.cos() * pitch.cos());
         looking_at(towards * DISTANCE, DVec3::ZERO, SIZE, FOCAL)
     };
-    (0..7).map(camera).collect()
+    (0..9).map(camera).collect()
 }
+
+/// The one that all others surround.
+pub const MIDDLE: usize = 4;
 
 /// A slanted wall that fills every image.
 pub fn wall(texture: Texture) -> Surface {
-    let centre = DVec3::new(0.0, 0.0, 0.8);
+    let centre = DVec3::new(0.0, 0.0, 0.6);
     Surface { shape: Shape::upright(centre, 12.0, DVec2::splat(20.0)), texture }
 }
 
 /// A sphere before a wall, both textured.
 pub fn plane_and_sphere() -> Procedural {
-    let shape = Shape::Sphere { centre: DVec3::new(0.1, 0.0, 0.0), radius: 0.7 };
-    Procedural::new(vec![Surface { shape, texture: Texture::Noise }, wall(Texture::Noise)], &arc())
+    let shape = Shape::Sphere { centre: DVec3::new(0.1, 0.0, -0.2), radius: 0.7 };
+    Procedural::new(vec![Surface { shape, texture: Texture::Noise }, wall(Texture::Noise)], &cameras())
 }
 
 /// Index of the post among the surfaces of [`occluding_post`].
@@ -245,7 +248,7 @@ pub const POST: usize = 0;
 /// A narrow upright post before a wall, both textured: each view hides another part of the wall.
 pub fn occluding_post() -> Procedural {
     let shape = Shape::upright(DVec3::new(0.0, 0.0, -0.4), 0.0, DVec2::new(0.25, 20.0));
-    Procedural::new(vec![Surface { shape, texture: Texture::Noise }, wall(Texture::Noise)], &arc())
+    Procedural::new(vec![Surface { shape, texture: Texture::Noise }, wall(Texture::Noise)], &cameras())
 }
 
 /// Index of the panel among the surfaces of [`textureless_panel`].
@@ -257,7 +260,7 @@ pub fn textureless_panel() -> Procedural {
     let Shape::Rectangle { centre, right, down, .. } = wall.shape else { unreachable!() };
     let shape = Shape::Rectangle { centre, right, down, half_size: DVec2::new(0.55, 0.4) };
     // Listed first, so that rays meet the panel, which lies in the wall.
-    Procedural::new(vec![Surface { shape, texture: Texture::Uniform }, wall], &arc())
+    Procedural::new(vec![Surface { shape, texture: Texture::Uniform }, wall], &cameras())
 }
 
 fn truth(surfaces: &[Surface], camera: &Camera) -> Maps {
