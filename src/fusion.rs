@@ -1,18 +1,30 @@
 //! Fusion of depth and normal maps into points (section 6 of the paper).
+//!
+//! Every pixel with a depth is a point that the overlapping views vouch for or against. One with enough agreeing
+//! views becomes a point of the cloud, averaged over them, and uses up the pixel it falls on in each: those start no
+//! points of their own. Pixels no point falls on do, so the cloud stays as dense as the view that saw a surface best.
+
+mod average;
+mod source;
 
 use crate::camera::Camera;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::image::Picture;
 use crate::maps::{Maps, PointCloud};
 use crate::options::FusionOptions;
-use crate::progress::Hook;
+use crate::progress::{Hook, Phase, Progress};
+use average::{Member, average};
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+use source::{Opinion, Source};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A view with its maps, as fusion needs it.
 #[derive(Debug, Clone, Copy)]
 pub struct FusionView<'a> {
     /// The camera of the maps.
     pub camera: &'a Camera,
-    /// Depth and normal, 0 where there is none.
+    /// Depth and normal, one each a pixel. A depth that is not a finite number above 0 is no estimate.
     pub maps: &'a Maps,
     /// For the colours; grey (128) without.
     pub picture: Option<&'a Picture>,
@@ -20,7 +32,176 @@ pub struct FusionView<'a> {
     pub overlap: &'a [u32],
 }
 
-/// Fuses the maps of all views.
-pub fn fuse(_views: &[FusionView], _options: &FusionOptions, _hook: Hook) -> Result<PointCloud> {
-    Ok(PointCloud::default())
+/// Rows fused at once: the hook is asked before each such band.
+const BAND_ROWS: u32 = 32;
+
+/// Fuses the maps of all views, on the threads of the current rayon pool; the cloud is the same for any number of
+/// them. The hook sees [`Phase::Fusion`] with `done` from 0 to 1 for the fusion alone.
+///
+/// # Errors
+/// Options out of range; a camera that makes no sense; maps or a picture of another size than their camera; an
+/// overlap that names a view there is not, the view itself or a view twice; [`Error::Cancelled`].
+pub fn fuse(views: &[FusionView], options: &FusionOptions, hook: Hook) -> Result<PointCloud> {
+    options.check()?;
+    for index in 0..views.len() {
+        check_view(views, index)?;
+    }
+    let used: Vec<Vec<AtomicBool>> = views
+        .iter()
+        .map(|view| (0..view.camera.pixels()).map(|_| AtomicBool::new(false)).collect())
+        .collect();
+    let total_rows: u64 = views.iter().map(|view| u64::from(view.camera.height)).sum();
+    let mut rows_done = 0;
+    let report = |view: usize, rows_done: u64| {
+        let done = rows_done as f64 / total_rows.max(1) as f64;
+        let progress =
+            Progress { phase: Phase::Fusion, reduction: 1, cycle: 0, view, views: views.len(), done };
+        if hook(&progress).is_break() { Err(Error::Cancelled) } else { Ok(()) }
+    };
+
+    let mut cloud = PointCloud::default();
+    for index in 0..views.len() {
+        let reference = Reference::new(views, index, options, &used);
+        let height = views[index].camera.height;
+        for top in (0..height).step_by(BAND_ROWS as usize) {
+            report(index, rows_done)?;
+            let rows = top..height.min(top + BAND_ROWS);
+            rows_done += rows.len() as u64;
+            let fused: Vec<PointCloud> = rows.into_par_iter().map(|row| reference.fuse_row(row)).collect();
+            fused.iter().for_each(|points| append(&mut cloud, points));
+        }
+    }
+    if let Some(last) = views.len().checked_sub(1) {
+        report(last, rows_done)?;
+    }
+    Ok(cloud)
+}
+
+fn check_view(views: &[FusionView], index: usize) -> Result<()> {
+    let (view, name) = (&views[index], format!("views[{index}]"));
+    view.camera.check(&format!("{name}.camera"))?;
+    let pixels = view.camera.pixels();
+    for (map, len) in [("depth", view.maps.depth.len()), ("normal", view.maps.normal.len())] {
+        if len != pixels {
+            let expected = format!("one for each of the camera's {pixels} pixels");
+            return Err(Error::argument(format!("{name}.maps.{map}"), format!("{len} values"), expected));
+        }
+    }
+    if let Some(picture) = view.picture
+        && (picture.width(), picture.height()) != (view.camera.width, view.camera.height)
+    {
+        let value = format!("{}x{}", picture.width(), picture.height());
+        let expected = format!("the camera's size, {}x{}", view.camera.width, view.camera.height);
+        return Err(Error::argument(format!("{name}.picture"), value, expected));
+    }
+    for (place, &other) in view.overlap.iter().enumerate() {
+        let known = (other as usize) < views.len() && other as usize != index;
+        if !known || view.overlap[..place].contains(&other) {
+            let expected = format!("other views below {}, each once", views.len());
+            return Err(Error::argument(format!("{name}.overlap[{place}]"), other, expected));
+        }
+    }
+    Ok(())
+}
+
+fn append(cloud: &mut PointCloud, points: &PointCloud) {
+    cloud.positions.extend_from_slice(&points.positions);
+    cloud.normals.extend_from_slice(&points.normals);
+    cloud.colours.extend_from_slice(&points.colours);
+    for point in 0..points.views.len() {
+        cloud.views.push(points.views.get(point));
+    }
+}
+
+/// Depth and unit normal of a pixel, `None` where there is no usable estimate.
+fn estimate(maps: &Maps, pixel: usize) -> Option<(f64, DVec3)> {
+    let depth = maps.depth[pixel];
+    let normal = DVec3::from_array(maps.normal[pixel].map(f64::from)).try_normalize()?;
+    (depth > 0.0 && depth.is_finite()).then_some((f64::from(depth), normal))
+}
+
+/// The view whose pixels become points. Positions are relative to its centre: large world coordinates lose no digits.
+struct Reference<'a> {
+    views: &'a [FusionView<'a>],
+    index: usize,
+    options: &'a FusionOptions,
+    sources: Vec<Source<'a>>,
+    /// By view and pixel, whether the pixel is part of a point. While one view is the reference, its own flags are only
+    /// read and those of the others only set: the order of the threads does not matter.
+    used: &'a [Vec<AtomicBool>],
+}
+
+impl<'a> Reference<'a> {
+    fn new(
+        views: &'a [FusionView<'a>],
+        index: usize,
+        options: &'a FusionOptions,
+        used: &'a [Vec<AtomicBool>],
+    ) -> Self {
+        let sources = views[index]
+            .overlap
+            .iter()
+            .map(|&other| Source::new(views[index].camera, other, &views[other as usize], options));
+        Reference { views, index, options, sources: sources.collect(), used }
+    }
+
+    fn fuse_row(&self, row: u32) -> PointCloud {
+        let view = &self.views[self.index];
+        let to_world = view.camera.rotation.transpose();
+        let first = row as usize * view.camera.width as usize;
+        let mut points = PointCloud::default();
+        let (mut members, mut point_views) = (Vec::new(), Vec::new());
+        for column in 0..view.camera.width {
+            let pixel = first + column as usize;
+            if self.used[self.index][pixel].load(Ordering::Relaxed) {
+                continue;
+            }
+            let Some((depth, normal)) = estimate(view.maps, pixel) else { continue };
+            let position = DVec2::new(f64::from(column), f64::from(row));
+            let start = Member {
+                view: self.index as u32,
+                pixel,
+                position: to_world * (view.camera.ray(position) * depth),
+                normal: to_world * normal,
+                weight: weight(view.camera, depth),
+            };
+            if !self.gather(start, position, depth, &mut members) {
+                continue;
+            }
+            for member in &members[1..] {
+                self.used[member.view as usize][member.pixel].store(true, Ordering::Relaxed);
+            }
+            point_views.clear();
+            point_views.extend(members.iter().map(|member| member.view));
+            let (position, normal, colour) = average(&members, |member| {
+                self.views[member.view as usize].picture.map(|picture| picture.rgb(member.pixel))
+            });
+            points.positions.push((view.camera.centre() + position).to_array());
+            points.normals.push(normal.as_vec3().to_array());
+            points.colours.push(colour);
+            points.views.push(&point_views);
+        }
+        points
+    }
+
+    /// Collects the start and the pixels of other views that agree with it; whether that makes a point.
+    fn gather(&self, start: Member, pixel: DVec2, depth: f64, members: &mut Vec<Member>) -> bool {
+        members.clear();
+        members.push(start);
+        let mut conflicts = 0;
+        for source in &self.sources {
+            match source.opinion(pixel, depth, &start) {
+                Opinion::Agrees(member) => members.push(member),
+                Opinion::SeesThrough => conflicts += 1,
+                Opinion::None => {}
+            }
+        }
+        // Edges of thin things are seen past by some views that are half a pixel off; only a majority is believed.
+        members.len() > self.options.min_views as usize && conflicts <= members.len()
+    }
+}
+
+/// Weight in the average: the inverse square of the width of a pixel on the surface.
+fn weight(camera: &Camera, depth: f64) -> f64 {
+    camera.fx * camera.fy / (depth * depth)
 }

@@ -38,6 +38,14 @@ pub struct FusionOptions {
     pub min_views: u32,
 }
 
+impl FusionOptions {
+    /// Refuses values no fusion can be made with, naming the option.
+    pub fn check(&self) -> Result<()> {
+        check_number("fusion.depth_tolerance", self.depth_tolerance, 0.0, 1.0)?;
+        check_number("fusion.normal_tolerance", self.normal_tolerance, 0.0, 180.0)
+    }
+}
+
 /// All options. Start from a preset; every field may be changed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
@@ -203,8 +211,7 @@ impl Options {
         check_number("depth_tolerance", self.depth_tolerance, 0.0, 1.0)?;
         check_number("normal_tolerance", self.normal_tolerance, 0.0, 180.0)?;
         check_number("consistent_share", self.consistent_share, 0.0, 1.0)?;
-        check_number("fusion.depth_tolerance", self.fusion.depth_tolerance, 0.0, 1.0)?;
-        check_number("fusion.normal_tolerance", self.fusion.normal_tolerance, 0.0, 180.0)
+        self.fusion.check()
     }
 
     fn check_scales(&self) -> Result<()> {

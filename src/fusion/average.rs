@@ -1,0 +1,97 @@
+//! The average of the pixels that agree on a point.
+
+use glam::DVec3;
+
+/// A pixel that is part of a point.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Member {
+    pub(super) view: u32,
+    /// Index in its view's maps.
+    pub(super) pixel: usize,
+    /// In the world's axes.
+    pub(super) position: DVec3,
+    /// Unit, in the world's axes.
+    pub(super) normal: DVec3,
+    /// In the average.
+    pub(super) weight: f64,
+}
+
+/// Members further from the median than this many median absolute deviations (two standard deviations of Gaussian
+/// errors) are left out: depths that agree within a percent may still be worse than what they would be averaged with.
+const MAX_DEVIATIONS: f64 = 3.0;
+
+/// Colour of points no picture sees.
+const GREY: [u8; 3] = [128; 3];
+
+/// Weighted means of position, normal (unit) and colour over the members that lie closest together; the first is the
+/// one the point started from. `colour` is `None` for members without a picture.
+pub(super) fn average(
+    members: &[Member],
+    colour: impl Fn(&Member) -> Option<[u8; 3]>,
+) -> (DVec3, DVec3, [u8; 3]) {
+    let start = &members[0];
+    // Along the normal only: a pixel's centre lies anywhere within half a pixel of the point.
+    let height = |member: &Member| (member.position - start.position).dot(start.normal);
+    let middle = median(members.iter().map(height).collect());
+    let deviation = |member: &Member| (height(member) - middle).abs();
+    let limit = MAX_DEVIATIONS * median(members.iter().map(deviation).collect());
+
+    let (mut offset, mut normal, mut weight) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+    let (mut colours, mut colour_weight) = (DVec3::ZERO, 0.0);
+    for member in members.iter().filter(|member| deviation(member) <= limit) {
+        offset += (member.position - start.position) * member.weight;
+        normal += member.normal * member.weight;
+        weight += member.weight;
+        if let Some(colour) = colour(member) {
+            colours += DVec3::from_array(colour.map(f64::from)) * member.weight;
+            colour_weight += member.weight;
+        }
+    }
+    let colour = match colour_weight > 0.0 {
+        true => (colours / colour_weight).round().to_array().map(|channel| channel as u8),
+        false => GREY,
+    };
+    (start.position + offset / weight, normal.try_normalize().unwrap_or(start.normal), colour)
+}
+
+/// The middle value, or the mean of the two in the middle. At least one value.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len() % 2 == 1 { values[middle] } else { (values[middle - 1] + values[middle]) / 2.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn member(height: f64) -> Member {
+        Member { view: 0, pixel: 0, position: DVec3::Z * height, normal: DVec3::Z, weight: 1.0 }
+    }
+
+    #[test]
+    fn a_member_far_from_the_others_is_left_out_even_if_it_is_the_start() {
+        let members = [5.0, 0.0, 0.1, 0.2].map(member);
+        let (position, ..) = average(&members, |_| None);
+        assert!((position.z - 0.1).abs() < 1e-12, "{position}");
+    }
+
+    #[test]
+    fn closer_views_weigh_more() {
+        let mut members = [0.0, 1.0].map(member);
+        members[1].weight = 3.0;
+        let (position, _, colour) =
+            average(&members, |member| Some([if member.weight > 1.0 { 200 } else { 100 }; 3]));
+        assert_eq!(position.z, 0.75);
+        assert_eq!(colour, [175; 3]);
+    }
+
+    #[test]
+    fn members_without_pictures_do_not_darken_the_colour() {
+        let mut members = [0.0, 0.0].map(member);
+        members[1].view = 1;
+        let colour = |member: &Member| (member.view == 0).then_some([10, 20, 30]);
+        assert_eq!(average(&members, colour).2, [10, 20, 30]);
+        assert_eq!(average(&members, |_| None).2, GREY);
+    }
+}

@@ -1,0 +1,7 @@
+//! Shared by the integration tests.
+
+// Every test file is a crate of its own and uses its own part of this module.
+#![allow(dead_code)]
+
+pub mod measure;
+pub mod procedural;

@@ -1,0 +1,344 @@
+//! Scenes made in code, whose depth, normal and visibility are known exactly: rectangles and spheres with solid
+//! texture, ray-cast. Nothing in them is random from run to run.
+
+use glam::{DMat3, DVec2, DVec3};
+use skep::camera::Camera;
+use skep::image::Picture;
+use skep::{Maps, Scene, SparsePoint, View};
+
+/// What a surface looks like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Texture {
+    /// Several octaves of noise over the world position.
+    Noise,
+    /// One grey value everywhere.
+    Uniform,
+}
+
+/// A finite surface of the world.
+#[derive(Debug, Clone, Copy)]
+pub enum Shape {
+    /// A rectangle around `centre`, spanned by the unit vectors `right` and `down`, seen from both sides.
+    Rectangle { centre: DVec3, right: DVec3, down: DVec3, half_size: DVec2 },
+    /// A sphere.
+    Sphere { centre: DVec3, radius: f64 },
+}
+
+/// A shape with its look.
+#[derive(Debug, Clone, Copy)]
+pub struct Surface {
+    pub shape: Shape,
+    pub texture: Texture,
+}
+
+/// Where a ray meets the world.
+#[derive(Debug, Clone, Copy)]
+pub struct Hit {
+    /// In multiples of the ray's direction.
+    pub distance: f64,
+    /// In the world frame.
+    pub position: DVec3,
+    /// In the world frame, towards the ray's origin.
+    pub normal: DVec3,
+    /// Index of the surface.
+    pub surface: usize,
+}
+
+/// Photographs of a world, with the truth.
+pub struct Procedural {
+    pub surfaces: Vec<Surface>,
+    pub views: Vec<View>,
+    /// Exact surface points at textured places, with the views that see them.
+    pub points: Vec<SparsePoint>,
+    /// Exact depth and normal of every view.
+    pub truth: Vec<Maps>,
+}
+
+/// Size of the standard scenes' images.
+pub const SIZE: (u32, u32) = (128, 96);
+/// Focal length of the standard scenes in pixels.
+const FOCAL: f64 = 130.0;
+/// Distance of the standard cameras from the world's origin.
+const DISTANCE: f64 = 4.0;
+/// Rays a pixel's side: the image is the mean over the pixel's area.
+const SUPERSAMPLES: u32 = 3;
+/// Pixels between the sparse points.
+const POINT_STEP: usize = 7;
+
+impl Shape {
+    /// A rectangle that faces a camera in front of it after a turn of `yaw` degrees around the vertical.
+    pub fn upright(centre: DVec3, yaw: f64, half_size: DVec2) -> Shape {
+        let (sine, cosine) = yaw.to_radians().sin_cos();
+        Shape::Rectangle { centre, right: DVec3::new(cosine, 0.0, sine), down: DVec3::Y, half_size }
+    }
+
+    /// Distance of a point from the sphere or from the rectangle's plane.
+    pub fn distance(&self, point: DVec3) -> f64 {
+        match *self {
+            Shape::Rectangle { centre, right, down, .. } => (point - centre).dot(right.cross(down)).abs(),
+            Shape::Sphere { centre, radius } => (point.distance(centre) - radius).abs(),
+        }
+    }
+
+    /// The nearest meeting in front of `origin`: distance in multiples of `direction`, and outward normal.
+    fn meet(&self, origin: DVec3, direction: DVec3) -> Option<(f64, DVec3)> {
+        match *self {
+            Shape::Rectangle { centre, right, down, half_size } => {
+                let normal = right.cross(down);
+                let distance = normal.dot(centre - origin) / normal.dot(direction);
+                let offset = origin + direction * distance - centre;
+                let inside = offset.dot(right).abs() <= half_size.x && offset.dot(down).abs() <= half_size.y;
+                (distance > 0.0 && distance.is_finite() && inside).then_some((distance, normal))
+            }
+            Shape::Sphere { centre, radius } => {
+                let (to_origin, squared) = (origin - centre, direction.length_squared());
+                let half = to_origin.dot(direction) / squared;
+                let root = half * half - (to_origin.length_squared() - radius * radius) / squared;
+                let distance = -half - root.max(0.0).sqrt();
+                let outward = (to_origin + direction * distance) / radius;
+                (root > 0.0 && distance > 0.0).then_some((distance, outward))
+            }
+        }
+    }
+}
+
+/// The first surface along a ray; of surfaces at the same place the one that is listed first.
+fn cast(surfaces: &[Surface], origin: DVec3, direction: DVec3) -> Option<Hit> {
+    let mut nearest: Option<Hit> = None;
+    for (surface, Surface { shape, .. }) in surfaces.iter().enumerate() {
+        if let Some((distance, outward)) = shape.meet(origin, direction)
+            && nearest.is_none_or(|hit| distance < hit.distance)
+        {
+            let normal = if outward.dot(direction) > 0.0 { -outward } else { outward };
+            nearest = Some(Hit { distance, position: origin + direction * distance, normal, surface });
+        }
+    }
+    nearest
+}
+
+/// What a camera sees in the direction of a pixel. Its ray has z = 1, so the distance is the depth.
+fn look(surfaces: &[Surface], camera: &Camera, pixel: DVec2) -> Option<Hit> {
+    cast(surfaces, camera.centre(), camera.rotation.transpose() * camera.ray(pixel))
+}
+
+impl Procedural {
+    /// Photographs the surfaces.
+    pub fn new(surfaces: Vec<Surface>, cameras: &[Camera]) -> Procedural {
+        let views = cameras.iter().enumerate().map(|(index, camera)| View {
+            name: format!("view{index}.png"),
+            picture: photograph(&surfaces, camera),
+            camera: *camera,
+            mask: None,
+            depth_range: None,
+        });
+        let truth = cameras.iter().map(|camera| truth(&surfaces, camera)).collect();
+        let mut made = Procedural { views: views.collect(), points: Vec::new(), truth, surfaces };
+        made.points = made.sparse_points();
+        made
+    }
+
+    /// The checked scene.
+    pub fn scene(&self) -> Scene {
+        Scene::new(self.views.clone(), self.points.clone()).expect("a procedural scene is in order")
+    }
+
+    /// The scene with only these views, in this order.
+    pub fn only(&self, kept: &[usize]) -> Procedural {
+        let place = |view: &u32| kept.iter().position(|&k| k == *view as usize).map(|place| place as u32);
+        let points = self.points.iter().map(|point| SparsePoint {
+            position: point.position,
+            views: point.views.iter().filter_map(place).collect(),
+        });
+        Procedural {
+            surfaces: self.surfaces.clone(),
+            views: kept.iter().map(|&view| self.views[view].clone()).collect(),
+            points: points.filter(|point| point.views.len() >= 2).collect(),
+            truth: kept.iter().map(|&view| self.truth[view].clone()).collect(),
+        }
+    }
+
+    /// What is seen at the centre of a pixel.
+    pub fn hit(&self, view: usize, pixel: usize) -> Option<Hit> {
+        let camera = &self.views[view].camera;
+        look(&self.surfaces, camera, pixel_centre(camera, pixel))
+    }
+
+    /// Whether a point of a surface is inside a view's image with nothing before it.
+    pub fn is_visible(&self, position: DVec3, view: usize) -> bool {
+        let camera = &self.views[view].camera;
+        let Some((pixel, depth)) = camera.project(position) else { return false };
+        camera.nearest_pixel(pixel).is_some()
+            && look(&self.surfaces, camera, pixel).is_some_and(|hit| hit.distance > depth * (1.0 - 1e-6))
+    }
+
+    fn sparse_points(&self) -> Vec<SparsePoint> {
+        let mut points = Vec::new();
+        for (view, View { camera, .. }) in self.views.iter().enumerate() {
+            // Views start on different rows and columns, so that their points are not the same.
+            for row in (view % POINT_STEP..camera.height as usize).step_by(POINT_STEP) {
+                for column in (view % POINT_STEP..camera.width as usize).step_by(POINT_STEP) {
+                    let Some(hit) = self.hit(view, row * camera.width as usize + column) else { continue };
+                    if self.surfaces[hit.surface].texture == Texture::Uniform {
+                        continue;
+                    }
+                    let seen = (0..self.views.len()).filter(|&other| self.is_visible(hit.position, other));
+                    let views: Vec<u32> = seen.map(|view| view as u32).collect();
+                    if views.len() >= 2 {
+                        points.push(SparsePoint { position: hit.position, views });
+                    }
+                }
+            }
+        }
+        points
+    }
+}
+
+/// The centre of the pixel with this index.
+pub fn pixel_centre(camera: &Camera, pixel: usize) -> DVec2 {
+    let width = camera.width as usize;
+    DVec2::new((pixel % width) as f64, (pixel / width) as f64)
+}
+
+/// A camera at `position` that looks at `target`, with the world's y downwards.
+pub fn looking_at(position: DVec3, target: DVec3, (width, height): (u32, u32), focal: f64) -> Camera {
+    let forward = (target - position).normalize();
+    let right = DVec3::Y.cross(forward).normalize();
+    let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
+    Camera {
+        width,
+        height,
+        fx: focal,
+        fy: focal,
+        cx: f64::from(width - 1) / 2.0,
+        cy: f64::from(height - 1) / 2.0,
+        rotation,
+        translation: -(rotation * position),
+    }
+}
+
+/// Nine cameras around the origin in three rows: most pairs see it under an angle of 10 to 30 degrees.
+pub fn cameras() -> Vec<Camera> {
+    let camera = |index: u32| {
+        let yaw = (14.0 * (f64::from(index % 3) - 1.0)).to_radians();
+        let pitch = (12.0 * (f64::from(index / 3) - 1.0)).to_radians();
+        let towards = DVec3::new(yaw.sin() * pitch.cos(), pitch.sin(), -yaw.cos() * pitch.cos());
+        looking_at(towards * DISTANCE, DVec3::ZERO, SIZE, FOCAL)
+    };
+    (0..9).map(camera).collect()
+}
+
+/// The one that all others surround.
+pub const MIDDLE: usize = 4;
+
+/// A slanted wall that fills every image.
+pub fn wall(texture: Texture) -> Surface {
+    let centre = DVec3::new(0.0, 0.0, 0.6);
+    Surface { shape: Shape::upright(centre, 12.0, DVec2::splat(20.0)), texture }
+}
+
+/// A sphere before a wall, both textured.
+pub fn plane_and_sphere() -> Procedural {
+    let shape = Shape::Sphere { centre: DVec3::new(0.1, 0.0, -0.2), radius: 0.7 };
+    Procedural::new(vec![Surface { shape, texture: Texture::Noise }, wall(Texture::Noise)], &cameras())
+}
+
+/// Index of the post among the surfaces of [`occluding_post`].
+pub const POST: usize = 0;
+
+/// A narrow upright post before a wall, both textured: each view hides another part of the wall.
+pub fn occluding_post() -> Procedural {
+    let shape = Shape::upright(DVec3::new(0.0, 0.0, -0.4), 0.0, DVec2::new(0.25, 20.0));
+    Procedural::new(vec![Surface { shape, texture: Texture::Noise }, wall(Texture::Noise)], &cameras())
+}
+
+/// Index of the panel among the surfaces of [`textureless_panel`].
+pub const PANEL: usize = 0;
+
+/// A textured wall with a uniform rectangle in its plane, in the middle of the images.
+pub fn textureless_panel() -> Procedural {
+    let wall = wall(Texture::Noise);
+    let Shape::Rectangle { centre, right, down, .. } = wall.shape else { unreachable!() };
+    let shape = Shape::Rectangle { centre, right, down, half_size: DVec2::new(0.55, 0.4) };
+    // Listed first, so that rays meet the panel, which lies in the wall.
+    Procedural::new(vec![Surface { shape, texture: Texture::Uniform }, wall], &cameras())
+}
+
+fn truth(surfaces: &[Surface], camera: &Camera) -> Maps {
+    let mut maps = Maps::default();
+    for pixel in 0..camera.pixels() {
+        let hit = look(surfaces, camera, pixel_centre(camera, pixel));
+        let normal = hit.map_or(DVec3::ZERO, |hit| camera.rotation * hit.normal);
+        maps.depth.push(hit.map_or(0.0, |hit| hit.distance as f32));
+        maps.normal.push(normal.as_vec3().to_array());
+    }
+    maps
+}
+
+fn photograph(surfaces: &[Surface], camera: &Camera) -> Picture {
+    let step = 1.0 / f64::from(SUPERSAMPLES);
+    let colour = |pixel: usize| {
+        let centre = pixel_centre(camera, pixel);
+        let mut sum = DVec3::ZERO;
+        for sample in 0..SUPERSAMPLES * SUPERSAMPLES {
+            let (column, row) = (f64::from(sample % SUPERSAMPLES), f64::from(sample / SUPERSAMPLES));
+            let offset = (DVec2::new(column, row) + 0.5) * step - 0.5;
+            sum +=
+                look(surfaces, camera, centre + offset).map_or(DVec3::ZERO, |hit| colour_of(surfaces, &hit));
+        }
+        (sum * step * step * 255.0).round().to_array().map(|channel| channel as u8)
+    };
+    let colours = (0..camera.pixels()).map(colour).collect();
+    Picture::from_rgb(camera.width, camera.height, colours).expect("one colour for each pixel")
+}
+
+/// Red, green and blue, 0 to 1.
+fn colour_of(surfaces: &[Surface], hit: &Hit) -> DVec3 {
+    match surfaces[hit.surface].texture {
+        Texture::Uniform => DVec3::splat(0.5),
+        Texture::Noise => {
+            let value = noise(hit.position);
+            DVec3::new(value, 0.9 * value + 0.05, 0.8 * value + 0.1)
+        }
+    }
+}
+
+/// Longest wavelength of the noise in world units: 16 pixels of the standard scenes; the shortest are 2 pixels.
+const WAVELENGTH: f64 = 0.5;
+const OCTAVES: u32 = 4;
+
+/// Sum of octaves of value noise, 0 to 1.
+fn noise(position: DVec3) -> f64 {
+    // Turned and moved, so that no surface runs along the lattice.
+    let turned = DMat3::from_rotation_x(0.7) * DMat3::from_rotation_y(1.1) * position + DVec3::splat(37.3);
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for octave in 0..OCTAVES {
+        let weight = 0.8f64.powi(octave as i32);
+        sum += weight * value_noise(turned * (f64::from(1 << octave) / WAVELENGTH), octave);
+        weights += weight;
+    }
+    // The mean of octaves stays near one half: spread it out.
+    ((sum / weights - 0.5) * 1.8 + 0.5).clamp(0.0, 1.0)
+}
+
+fn value_noise(position: DVec3, octave: u32) -> f64 {
+    let cell = position.floor();
+    let blend = position - cell;
+    let blend = blend * blend * (DVec3::splat(3.0) - 2.0 * blend);
+    let mut sum = 0.0;
+    for corner in 0..8u32 {
+        let bits = DVec3::new(f64::from(corner & 1), f64::from(corner >> 1 & 1), f64::from(corner >> 2));
+        let weight = (DVec3::ONE - bits) * (DVec3::ONE - blend) + bits * blend;
+        sum += weight.x * weight.y * weight.z * lattice_value(cell + bits, octave);
+    }
+    sum
+}
+
+/// A number from 0 to 1 that looks random, the same for the same place.
+fn lattice_value(place: DVec3, octave: u32) -> f64 {
+    let mut hash = u64::from(octave);
+    for coordinate in place.to_array() {
+        hash = (hash ^ coordinate as i64 as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        hash ^= hash >> 29;
+    }
+    (hash >> 11) as f64 / (1u64 << 53) as f64
+}

@@ -1,0 +1,332 @@
+//! The whole method on procedural scenes: what comes out is held against the truth.
+
+mod common;
+
+use common::measure::{Share, normal_error, share_right};
+use common::procedural::{self, MIDDLE, Procedural, Shape, Surface, Texture, looking_at, pixel_centre};
+use glam::{DVec2, DVec3};
+use skep::{
+    DepthRange, Error, Maps, Options, Outcome, Phase, Progress, Reconstruction, Scale, ViewResult,
+    ignore_progress, reconstruct,
+};
+use std::ops::ControlFlow;
+use std::sync::Mutex;
+
+/// Of true depth, as the fusion's tolerance.
+const RIGHT: f64 = 0.01;
+
+fn options() -> Options {
+    Options { threads: 2, ..Options::default() }
+}
+
+fn run(made: &Procedural, options: &Options) -> Reconstruction {
+    let result = reconstruct(&made.scene(), options, &ignore_progress).unwrap();
+    assert_eq!(result.views.len(), made.views.len());
+    for (view, made) in result.views.iter().zip(&made.views) {
+        let pixels = made.camera.pixels();
+        assert_eq!(view.estimate.depth.len(), pixels);
+        assert_eq!(view.estimate.normal.len(), pixels);
+        assert_eq!(view.cost.len(), pixels);
+        assert_eq!(view.outcome.len(), pixels);
+    }
+    result
+}
+
+fn share_right_of_estimates(
+    made: &Procedural,
+    result: &Reconstruction,
+    chosen: impl Fn(usize, usize) -> bool,
+) -> f64 {
+    let maps = result.views.iter().map(|view| &view.estimate).zip(&made.truth);
+    share_right(maps, RIGHT, chosen).value()
+}
+
+fn is_validated(result: &Reconstruction, view: usize, pixel: usize) -> bool {
+    result.views[view].outcome[pixel] == Outcome::Validated
+}
+
+#[test]
+fn most_pixels_of_a_textured_scene_are_right() {
+    let made = procedural::plane_and_sphere();
+    let result = run(&made, &options());
+
+    let raw = share_right_of_estimates(&made, &result, |_, _| true);
+    assert!(raw > 0.85, "{raw} of the raw estimates are right");
+    let precision =
+        share_right_of_estimates(&made, &result, |view, pixel| is_validated(&result, view, pixel));
+    assert!(precision > 0.93, "{precision} of the validated pixels are right");
+    let filtered: Vec<Maps> = result.views.iter().map(ViewResult::filtered).collect();
+    let complete = share_right(filtered.iter().zip(&made.truth), RIGHT, |_, _| true).value();
+    assert!(complete > 0.8, "{complete} of all pixels are validated and right");
+
+    let mut close_normals = Share::default();
+    for (view, truth) in result.views.iter().zip(&made.truth) {
+        for pixel in (0..truth.depth.len()).filter(|&pixel| view.outcome[pixel] == Outcome::Validated) {
+            close_normals.add(normal_error(&view.estimate, truth, pixel) < 20.0);
+        }
+    }
+    assert!(close_normals.value() > 0.75, "{close_normals:?}");
+
+    let on_a_surface = |point: &[f64; 3]| {
+        let point = DVec3::from_array(*point);
+        made.surfaces.iter().any(|surface| surface.shape.distance(point) < 0.02)
+    };
+    let cloud = &result.points;
+    let near = cloud.positions.iter().filter(|point| on_a_surface(point)).count();
+    assert!(near as f64 > 0.9 * cloud.positions.len() as f64, "{near} of {}", cloud.positions.len());
+    assert!(cloud.positions.len() > 10_000, "{} points", cloud.positions.len());
+}
+
+#[test]
+fn every_pixel_has_a_depth_in_range_a_unit_normal_and_a_reason() {
+    let made = procedural::plane_and_sphere().only(&[1, 3, 4, 5, 7]);
+    let scene = made.scene();
+    let result = run(&made, &options());
+    for (index, view) in result.views.iter().enumerate() {
+        let (camera, range) = (&made.views[index].camera, scene.depth_range(index));
+        assert_eq!(view.outcome_counts().iter().sum::<u64>(), camera.pixels() as u64);
+        for pixel in 0..camera.pixels() {
+            let depth = f64::from(view.estimate.depth[pixel]);
+            assert!((range.near * 0.999..=range.far * 1.001).contains(&depth), "depth {depth}");
+            let normal = DVec3::from_array(view.estimate.normal[pixel].map(f64::from));
+            assert!((normal.length() - 1.0).abs() < 1e-3);
+            assert!(normal.dot(camera.ray(pixel_centre(camera, pixel))) < 0.0, "a normal turns away");
+            assert!((0.0..=2.0).contains(&view.cost[pixel]), "cost {}", view.cost[pixel]);
+        }
+        assert!(view.sources.iter().all(|&source| source as usize != index && source < 5));
+        assert!(view.counts.ncc_evaluations > 0 && view.counts.samples > view.counts.ncc_evaluations);
+        assert!(!view.cycles.is_empty());
+    }
+}
+
+/// How the sets of validated wall pixels treat sources the truth says are hidden by the post, and others.
+struct SetShares {
+    /// Members of the sets that see the point.
+    precision: Share,
+    /// Hidden sources that are in the set.
+    hidden_kept: Share,
+    /// Visible sources that are in the set.
+    visible_kept: Share,
+}
+
+fn set_shares(made: &Procedural, result: &Reconstruction) -> SetShares {
+    let mut shares = SetShares {
+        precision: Share::default(),
+        hidden_kept: Share::default(),
+        visible_kept: Share::default(),
+    };
+    for (index, view) in result.views.iter().enumerate() {
+        for pixel in 0..view.outcome.len() {
+            let hit = made.hit(index, pixel).unwrap();
+            if view.outcome[pixel] != Outcome::Validated || hit.surface == procedural::POST {
+                continue;
+            }
+            for (place, &source) in view.sources.iter().enumerate() {
+                let camera = &made.views[source as usize].camera;
+                let (projection, _) = camera.project(hit.position).unwrap();
+                if camera.nearest_pixel(projection).is_none() {
+                    continue;
+                }
+                let sees = made.is_visible(hit.position, source as usize);
+                let kept = view.view_sets.contains(pixel, place);
+                if kept {
+                    shares.precision.add(sees);
+                }
+                if sees { &mut shares.visible_kept } else { &mut shares.hidden_kept }.add(kept);
+            }
+        }
+    }
+    shares
+}
+
+#[test]
+fn views_that_are_occluded_are_dropped_from_the_pixel_s_set() {
+    let made = procedural::occluding_post();
+    let with = set_shares(&made, &run(&made, &options()));
+    let without = set_shares(&made, &run(&made, &Options { view_selection: false, ..options() }));
+
+    assert!(with.hidden_kept.count > 2_000, "{:?}", with.hidden_kept);
+    assert!(with.hidden_kept.value() < 0.25, "{:?} of the hidden sources stay", with.hidden_kept);
+    assert!(with.visible_kept.value() > 0.9, "{:?} of the seeing sources stay", with.visible_kept);
+    assert!(with.precision.value() > 0.97, "{:?}", with.precision);
+    assert!(without.hidden_kept.value() > 0.9, "{:?}", without.hidden_kept);
+    assert!(with.precision.value() > without.precision.value());
+}
+
+/// Pixels of the panel whose window holds nothing else.
+fn is_inside_panel(made: &Procedural, view: usize, pixel: usize, margin: usize) -> bool {
+    let width = made.views[view].camera.width as usize;
+    let on_panel = |pixel: usize| made.hit(view, pixel).is_some_and(|hit| hit.surface == procedural::PANEL);
+    on_panel(pixel)
+        && [margin, margin * width].iter().all(|step| on_panel(pixel - step) && on_panel(pixel + step))
+}
+
+#[test]
+fn a_panel_without_texture_is_recovered_with_the_reward_and_not_without() {
+    let made = procedural::textureless_panel().only(&[1, 3, 4, 5, 7]);
+    // Nothing else may carry planes inwards: neither coarser scales, where the panel is small, nor other views.
+    let scale = Scale { halvings: 0, foods: 3, first_iterations: 6, cycles: 16, cycle_iterations: 1 };
+    let alone = Options {
+        scales: vec![scale],
+        stop_share: 0.0,
+        propagation: false,
+        geometric_weight: 0.0,
+        ..options()
+    };
+    let margin = options().window_radius as usize + 1;
+    let inside: Vec<Vec<bool>> = (0..made.views.len())
+        .map(|view| {
+            let pixels = 0..made.views[view].camera.pixels();
+            pixels.map(|pixel| is_inside_panel(&made, view, pixel, margin)).collect()
+        })
+        .collect();
+    let recovered = |reward: f64| {
+        let result = run(&made, &Options { reward, ..alone.clone() });
+        share_right_of_estimates(&made, &result, |view, pixel| inside[view][pixel])
+    };
+    let (with, without) = (recovered(options().reward), recovered(0.0));
+    assert!(with > 0.5 && without < 0.1, "{with} with and {without} without the reward");
+}
+
+fn bits(values: &[f32]) -> Vec<u32> {
+    values.iter().map(|value| value.to_bits()).collect()
+}
+
+#[test]
+fn the_result_is_the_same_bits_for_any_number_of_threads() {
+    let made = procedural::plane_and_sphere().only(&[1, 3, 4, 5]);
+    let one = run(&made, &Options { threads: 1, ..options() });
+    for threads in [2, 5] {
+        let other = run(&made, &Options { threads, ..options() });
+        for (a, b) in one.views.iter().zip(&other.views) {
+            assert!(bits(&a.estimate.depth) == bits(&b.estimate.depth), "depths on {threads} threads");
+            let (normals, others) = (a.estimate.normal.as_flattened(), b.estimate.normal.as_flattened());
+            assert!(bits(normals) == bits(others), "normals on {threads} threads");
+            assert!(bits(&a.cost) == bits(&b.cost), "costs on {threads} threads");
+            assert!(a.outcome == b.outcome, "outcomes on {threads} threads");
+            assert!(a.sources == b.sources && a.view_sets == b.view_sets, "sets on {threads} threads");
+            assert_eq!(a.counts, b.counts);
+            assert_eq!(a.cycles, b.cycles);
+        }
+        assert!(one.points == other.points, "points on {threads} threads");
+        assert_eq!(one.warnings, other.warnings);
+    }
+}
+
+#[test]
+fn another_seed_gives_other_bits() {
+    let made = procedural::plane_and_sphere().only(&[3, 4, 5]);
+    let depth = |seed: u64| run(&made, &Options { seed, ..options() }).views[1].estimate.depth.clone();
+    assert!(depth(0) != depth(1));
+}
+
+#[test]
+fn the_hook_follows_the_run_and_stops_it_in_every_phase() {
+    let scene = procedural::plane_and_sphere().only(&[3, 4, 5]).scene();
+    let seen = Mutex::new(Vec::new());
+    let watch = |progress: &Progress| {
+        seen.lock().unwrap().push(*progress);
+        ControlFlow::Continue(())
+    };
+    reconstruct(&scene, &options(), &watch).unwrap();
+    let seen = seen.into_inner().unwrap();
+    assert!(seen.iter().all(|progress| progress.views == 3 && progress.view < 3));
+    assert!(seen.iter().all(|progress| (0.0..=1.0).contains(&progress.done)));
+    for phase in [Phase::Search, Phase::Check, Phase::Fusion] {
+        assert!(seen.iter().any(|progress| progress.phase == phase), "{}", phase.name());
+        let stop = |progress: &Progress| match progress.phase == phase {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        };
+        assert_eq!(reconstruct(&scene, &options(), &stop).err(), Some(Error::Cancelled), "{}", phase.name());
+    }
+}
+
+/// A run without any validated pixel or point, that says why.
+fn assert_ends_with_reasons(made: &Procedural) {
+    for options in [options(), Options { threads: 2, ..Options::paper() }] {
+        let result = run(made, &options);
+        assert!(result.points.positions.is_empty());
+        assert!(!result.warnings.is_empty(), "nothing came out and nothing was said");
+        for view in &result.views {
+            let reasons =
+                [Outcome::NoSources, Outcome::NoTexture, Outcome::Inconsistent, Outcome::OutOfRange];
+            assert!(view.outcome.iter().all(|outcome| reasons.contains(outcome)));
+            let without_sources = view.outcome.iter().filter(|&&o| o == Outcome::NoSources).count();
+            assert!(without_sources * 2 > view.outcome.len(), "{:?}", view.outcome_counts());
+        }
+    }
+}
+
+#[test]
+fn two_views_run_to_an_end_and_say_why_nothing_is_validated() {
+    assert_ends_with_reasons(&procedural::plane_and_sphere().only(&[3, 4]));
+}
+
+#[test]
+fn views_without_overlap_run_to_an_end_and_say_why_nothing_is_validated() {
+    // Four cameras back to back, each before its own wall.
+    let yaws = [0.0, 90.0, 180.0, 270.0];
+    let outwards = |yaw: f64| DVec3::new(-yaw.to_radians().sin(), 0.0, yaw.to_radians().cos());
+    let walls = yaws.map(|yaw| Surface {
+        shape: Shape::upright(outwards(yaw) * 4.0, yaw, DVec2::splat(4.0)),
+        texture: Texture::Noise,
+    });
+    let cameras = yaws.map(|yaw| looking_at(outwards(yaw) * 0.1, outwards(yaw), (64, 48), 70.0));
+    let mut made = Procedural::new(walls.to_vec(), &cameras);
+    for view in &mut made.views {
+        view.depth_range = Some(DepthRange { near: 2.0, far: 6.0 });
+    }
+    assert!(made.points.is_empty());
+    assert_ends_with_reasons(&made);
+}
+
+#[test]
+fn masked_pixels_get_no_estimate_but_serve_other_views() {
+    let mut made = procedural::plane_and_sphere();
+    let width = procedural::SIZE.0 as usize;
+    let is_masked = |pixel: usize| pixel % width < width / 2;
+    let pixels = made.views[MIDDLE].camera.pixels();
+    made.views[MIDDLE].mask = Some((0..pixels).map(|pixel| !is_masked(pixel)).collect());
+    // A mask that wants nothing.
+    made.views[0].mask = Some(vec![false; pixels]);
+    let result = run(&made, &options());
+
+    for pixel in 0..pixels {
+        assert_eq!(result.views[0].outcome[pixel], Outcome::Masked);
+        let view = &result.views[MIDDLE];
+        assert_eq!(view.outcome[pixel] == Outcome::Masked, is_masked(pixel));
+        assert_eq!(view.estimate.depth[pixel] > 0.0, !is_masked(pixel));
+        if is_masked(pixel) {
+            assert_eq!(view.estimate.normal[pixel], [0.0; 3]);
+        }
+    }
+    assert!(result.views[0].estimate.depth.iter().all(|&depth| depth == 0.0));
+    let wanted = share_right_of_estimates(&made, &result, |view, pixel| view == MIDDLE && !is_masked(pixel));
+    assert!(wanted > 0.8, "{wanted} of the wanted half is right");
+    let others = share_right_of_estimates(&made, &result, |view, _| view != MIDDLE && view != 0);
+    assert!(others > 0.8, "{others} of the other views is right");
+    for point in 0..result.points.views.len() {
+        assert!(!result.points.views.get(point).contains(&0), "a masked view is no part of a point");
+    }
+}
+
+#[test]
+fn a_view_s_own_depth_range_is_kept() {
+    let mut made = procedural::plane_and_sphere().only(&[1, 3, 4, 5]);
+    // The wall lies beyond, the sphere inside.
+    let range = DepthRange { near: 3.0, far: 4.2 };
+    made.views[1].depth_range = Some(range);
+    let result = run(&made, &options());
+    let depths = &result.views[1].estimate.depth;
+    assert!(depths.iter().all(|&depth| (2.999..4.201).contains(&depth)));
+    let beyond = |pixel: usize| made.truth[1].depth[pixel] > 4.4;
+    let validated =
+        (0..depths.len()).filter(|&pixel| beyond(pixel) && is_validated(&result, 1, pixel)).count();
+    let count = (0..depths.len()).filter(|&pixel| beyond(pixel)).count();
+    assert!(count > 1000 && validated * 20 < count, "{validated} of {count} beyond the range are validated");
+    let within = share_right_of_estimates(&made, &result, |view, pixel| {
+        view == 1 && f64::from(made.truth[1].depth[pixel]) < 0.98 * range.far
+    });
+    assert!(within > 0.7, "{within} within the range are right");
+}
