@@ -96,7 +96,7 @@ impl ReferencePatch {
     #[inline(always)]
     pub fn sample<S: Simd>(&mut self, simd: S, window: &Window, image: &PackedImage, x: usize, y: usize) {
         let (width, height) = (image.width, image.height);
-        let centre = simd.splat((image.words[y * width + x] & 0xff) as f32);
+        let centre = simd.splat(f32::from(image.grey(x, y)));
         let (x, y) = (simd.splat(x as f32), simd.splat(y as f32));
         let (right, bottom) = (simd.splat((width - 1) as f32), simd.splat((height - 1) as f32));
         let zero = simd.splat(0.0);
@@ -106,7 +106,7 @@ impl ReferencePatch {
                 (simd.add(x, simd.load(&offsets.x)), simd.add(y, simd.load(&offsets.y)));
             let inside_x = simd.min(simd.max(sample_x, zero), right);
             let inside_y = simd.min(simd.max(sample_y, zero), bottom);
-            let [grey, ..] = simd.gather_bytes(&image.words, width, inside_x, inside_y);
+            let [grey, ..] = simd.gather_bytes(&image.pairs, image.stride(), inside_x, inside_y);
             let difference = simd.max(simd.sub(grey, centre), simd.sub(centre, grey));
             let weight =
                 simd.mul(simd.load(&offsets.weight), simd.look_up(&window.colour_weights, difference));
@@ -179,8 +179,8 @@ pub fn patch_cost<S: Simd>(
         let y = simd.min(simd.max(y, zero), bottom);
         let (column, row) = (simd.whole(x), simd.whole(y));
         let (fraction_x, fraction_y) = (simd.sub(x, column), simd.sub(y, row));
-        let [top_left, top_right, bottom_left, bottom_right] =
-            simd.gather_bytes(&source.words, source.width, column, row);
+        let [top_left, bottom_left, top_right, bottom_right] =
+            simd.gather_bytes(&source.pairs, source.stride(), column, row);
         let top = simd.mul_add(fraction_x, simd.sub(top_right, top_left), top_left);
         let low = simd.mul_add(fraction_x, simd.sub(bottom_right, bottom_left), bottom_left);
         let grey = simd.mul_add(fraction_y, simd.sub(low, top), top);

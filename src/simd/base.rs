@@ -63,8 +63,8 @@ impl Simd for Base {
 
     // `wide` has no gather: lanes are read one by one.
     #[inline(always)]
-    fn gather_bytes(self, words: &[u32], stride: usize, x: f32x8, y: f32x8) -> [f32x8; 4] {
-        Scalar.gather_bytes(words, stride, x.to_array(), y.to_array()).map(f32x8::new)
+    fn gather_bytes(self, pairs: &[u16], stride: usize, x: f32x8, y: f32x8) -> [f32x8; 4] {
+        Scalar.gather_bytes(pairs, stride, x.to_array(), y.to_array()).map(f32x8::new)
     }
 
     #[inline(always)]

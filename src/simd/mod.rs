@@ -46,9 +46,9 @@ pub trait Simd: Copy + Send + Sync {
     fn min(self, a: Self::F32, b: Self::F32) -> Self::F32;
     /// The whole part of lanes in [0, 2^24).
     fn whole(self, a: Self::F32) -> Self::F32;
-    /// The four bytes, lowest first, of `words[y * stride + x]` for whole, non-negative `x` and `y`. An index beyond
-    /// the words reads the last one; `words` must not be empty.
-    fn gather_bytes(self, words: &[u32], stride: usize, x: Self::F32, y: Self::F32) -> [Self::F32; 4];
+    /// The four bytes, lowest first, of the pairs at `y * stride + x` and after it, for whole, non-negative `x` and `y`.
+    /// An index beyond the last two pairs reads those; there must be two.
+    fn gather_bytes(self, pairs: &[u16], stride: usize, x: Self::F32, y: Self::F32) -> [Self::F32; 4];
     /// `table[a]` for whole lanes in [0, 255].
     fn look_up(self, table: &[f32; 256], a: Self::F32) -> Self::F32;
     /// The sum of the lanes, as `((l0 + l4) + (l2 + l6)) + ((l1 + l5) + (l3 + l7))`.

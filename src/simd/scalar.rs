@@ -62,9 +62,12 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
-    fn gather_bytes(self, words: &[u32], stride: usize, x: Self::F32, y: Self::F32) -> [Self::F32; 4] {
-        let word = |lane: usize| words[(y[lane] as usize * stride + x[lane] as usize).min(words.len() - 1)];
-        let bytes: [[u8; 4]; LANES] = from_fn(|lane| word(lane).to_le_bytes());
+    fn gather_bytes(self, pairs: &[u16], stride: usize, x: Self::F32, y: Self::F32) -> [Self::F32; 4] {
+        let bytes: [[u8; 4]; LANES] = from_fn(|lane| {
+            let index = (y[lane] as usize * stride + x[lane] as usize).min(pairs.len() - 2);
+            let ([a, b], [c, d]) = (pairs[index].to_le_bytes(), pairs[index + 1].to_le_bytes());
+            [a, b, c, d]
+        });
         from_fn(|tap| from_fn(|lane| f32::from(bytes[lane][tap])))
     }
 

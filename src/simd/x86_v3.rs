@@ -85,21 +85,20 @@ impl Simd for X86V3 {
     }
 
     #[inline(always)]
-    fn gather_bytes(self, words: &[u32], stride: usize, x: __m256, y: __m256) -> [__m256; 4] {
-        assert!(!words.is_empty() && words.len() <= i32::MAX as usize);
+    fn gather_bytes(self, pairs: &[u16], stride: usize, x: __m256, y: __m256) -> [__m256; 4] {
+        assert!(pairs.len() >= 2 && pairs.len() <= i32::MAX as usize);
         // Eight loads instead of a gather instruction: a fifth faster for a whole patch on Zen 5, and Intel's gather has
         // been slowed down by microcode.
-        // SAFETY: AVX2 is there. Each index is clamped, as unsigned, to the last word, and the words fit an i32 as the
-        // assertion says, so every lane reads inside the slice.
+        // SAFETY: AVX2 is there. Each index is clamped, as unsigned, to the last pair but one, and the pairs fit an i32
+        // as the assertion says, so every lane reads two pairs inside the slice; the read may be unaligned.
         unsafe {
             let row = _mm256_mullo_epi32(_mm256_cvttps_epi32(y), _mm256_set1_epi32(stride as i32));
             let index = _mm256_add_epi32(row, _mm256_cvttps_epi32(x));
-            let index = _mm256_min_epu32(index, _mm256_set1_epi32((words.len() - 1) as i32));
+            let index = _mm256_min_epu32(index, _mm256_set1_epi32((pairs.len() - 2) as i32));
             let mut at = [0u32; LANES];
             _mm256_storeu_si256(at.as_mut_ptr().cast(), index);
-            let word = |lane: usize| *words.get_unchecked(at[lane] as usize) as i32;
-            let word =
-                _mm256_setr_epi32(word(0), word(1), word(2), word(3), word(4), word(5), word(6), word(7));
+            let two = |lane: usize| pairs.as_ptr().add(at[lane] as usize).cast::<i32>().read_unaligned();
+            let word = _mm256_setr_epi32(two(0), two(1), two(2), two(3), two(4), two(5), two(6), two(7));
             let byte = _mm256_set1_epi32(0xff);
             [
                 _mm256_cvtepi32_ps(_mm256_and_si256(word, byte)),
