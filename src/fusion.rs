@@ -5,6 +5,7 @@
 //! points of their own. Pixels no point falls on do, so the cloud stays as dense as the view that saw a surface best.
 
 mod average;
+mod overlap;
 mod source;
 
 use crate::camera::Camera;
@@ -15,6 +16,7 @@ use crate::options::FusionOptions;
 use crate::progress::{Hook, Phase, Progress};
 use average::{Member, average};
 use glam::{DVec2, DVec3};
+pub use overlap::overlaps;
 use rayon::prelude::*;
 use source::{Opinion, Source};
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -13,4 +13,4 @@ pub use colony::Offer;
 pub use cost::CostRules;
 pub use food::{FoodSource, MIN_FACING};
 pub use random::stream;
-pub use schedule::{Assessment, Search, assess};
+pub use schedule::{Assessment, BAND_ROWS, Search, assess};

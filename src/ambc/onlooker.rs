@@ -42,21 +42,20 @@ pub fn send<S: Simd>(
     reward: f32,
     random: &mut Random,
 ) {
-    for index in 0..foods.len() {
-        let food = foods[index];
+    for food in foods {
         let offer = draw_neighbour(neighbours, x, y, random)
             .and_then(|(dx, dy)| brought(evaluator, neighbours, (x, y), (dx, dy)))
-            .filter(|offer| !is_same_plane(&food, offer));
+            .filter(|offer| !is_same_plane(food, offer));
         if let Some(offer) = offer {
             let reward = if offer.validated { reward } else { 0.0 };
             let bound = cost_to_beat(food.cost, reward);
             let cost = evaluator.cost(&offer, bound);
             if cost < bound {
-                foods[index] = FoodSource { cost, ..offer };
+                *food = FoodSource { cost, ..offer };
                 continue;
             }
         }
-        foods[index].trials = food.trials.saturating_add(1);
+        food.trials = food.trials.saturating_add(1);
     }
 }
 

@@ -15,7 +15,7 @@ use crate::views::{Reference, ViewRules, ViewSets};
 use rayon::prelude::*;
 
 /// Rows of a band, the unit of work of a thread.
-const BAND_ROWS: usize = 8;
+pub const BAND_ROWS: usize = 8;
 /// Columns of a tile: with the rows of a band, its colonies and the parts of the sources they reach stay in cache.
 const TILE_COLUMNS: usize = 64;
 
@@ -214,7 +214,7 @@ fn fill_colony<S: Simd>(
     }
     for index in next..colony.len() {
         let (spread, tilt) = search.around_start;
-        colony[index] = if start.is_some() && spread > 0.0 {
+        colony[index] = if spread > 0.0 && start.is_some_and(|start| start.validated || index == 1) {
             colony[0].nearby(reference, ray, random, spread, tilt)
         } else {
             let part = (index as f32 / strata, (index + 1) as f32 / strata);

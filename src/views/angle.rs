@@ -52,6 +52,14 @@ pub fn source_lists(scene: &Scene, options: &Options) -> SourceLists {
         if options.max_sources > 0 {
             list.truncate(options.max_sources as usize);
         }
+        let needed = options.min_consistent as usize;
+        if (1..needed).contains(&list.len()) {
+            found.warnings.push(format!(
+                "{} has {} source view(s), but {needed} must agree with a solution: nothing can be validated in it",
+                view.name,
+                list.len()
+            ));
+        }
         found.lists.push(list);
     }
     found

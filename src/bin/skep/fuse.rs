@@ -4,10 +4,9 @@ use crate::arguments::Fuse;
 use crate::interrupt::Interrupt;
 use crate::progress::Display;
 use crate::{Failure, streams};
-use skep::fusion::{FusionView, fuse};
+use skep::fusion::{FusionView, fuse, overlaps};
 use skep::io::{Workspace, WorkspaceMaps};
-use skep::{Error, Options, PointCloud, Progress, SparsePoint};
-use std::collections::BTreeSet;
+use skep::{Error, Options, PointCloud, Progress};
 
 /// Runs the command.
 pub fn run(arguments: &Fuse) -> Result<(), Failure> {
@@ -62,23 +61,6 @@ fn fuse_maps(maps: &WorkspaceMaps, display: Display, interrupt: &Interrupt) -> s
     interrupt.check().map(|()| cloud)
 }
 
-/// For each view those that share a sparse point with it; all others where no point tells.
-fn overlaps(views: usize, points: &[SparsePoint]) -> Vec<Vec<u32>> {
-    let mut overlaps = vec![BTreeSet::new(); views];
-    for point in points {
-        for &view in &point.views {
-            let others = point.views.iter().filter(|&&other| other != view);
-            overlaps[view as usize].extend(others);
-        }
-    }
-    let all_others = |view: usize| (0..views as u32).filter(move |&other| other as usize != view);
-    let list = |(view, overlap): (usize, BTreeSet<u32>)| match overlap.is_empty() {
-        true => all_others(view).collect(),
-        false => overlap.into_iter().collect(),
-    };
-    overlaps.into_iter().enumerate().map(list).collect()
-}
-
 /// What was fused and, when the cloud is empty, what may be the reason.
 fn summary(maps: &WorkspaceMaps, cloud: &PointCloud) -> Vec<String> {
     let pixels: usize = maps.views.iter().map(|view| view.maps.depth.len()).sum();
@@ -95,16 +77,4 @@ fn summary(maps: &WorkspaceMaps, cloud: &PointCloud) -> Vec<String> {
         });
     }
     lines
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn views_overlap_when_they_share_a_point_and_with_all_when_no_point_tells() {
-        let point = |views: &[u32]| SparsePoint { position: Default::default(), views: views.to_vec() };
-        let overlaps = overlaps(4, &[point(&[0, 2]), point(&[2, 3, 0])]);
-        assert_eq!(overlaps, [vec![2, 3], vec![0, 2, 3], vec![0, 3], vec![0, 2]]);
-    }
 }

@@ -1,0 +1,49 @@
+//! The order of the searches of a run.
+
+use crate::options::{Options, Scale};
+use crate::progress::{Phase, Progress};
+use crate::scene::Scene;
+
+/// One cycle on one scale.
+#[derive(Debug, Clone, Copy)]
+pub struct Step {
+    /// Place of the scale among the options' scales.
+    pub scale_index: usize,
+    /// The scale.
+    pub scale: Scale,
+    /// The cycle on it, counted from 0.
+    pub cycle: u32,
+}
+
+impl Step {
+    /// All steps of a run in order.
+    pub fn all(options: &Options) -> Vec<Step> {
+        let scales = options.scales.iter().enumerate();
+        let cycles = |(scale_index, &scale): (usize, &Scale)| {
+            (0..=scale.cycles).map(move |cycle| Step { scale_index, scale, cycle })
+        };
+        scales.flat_map(cycles).collect()
+    }
+
+    /// Rounds of bees.
+    pub fn iterations(&self) -> u32 {
+        if self.cycle == 0 { self.scale.first_iterations } else { self.scale.cycle_iterations }
+    }
+
+    /// How many times smaller than full size a side of its images is.
+    pub fn reduction(&self) -> u32 {
+        1 << self.scale.halvings
+    }
+
+    /// Units of work of searching all views: a pass over a pixel counts its food sources.
+    pub fn work(&self, scene: &Scene) -> u64 {
+        let pixels: u64 = scene.views().iter().map(|view| view.camera.pixels() as u64).sum();
+        let passes = 1 + 2 * u64::from(self.iterations());
+        (pixels >> (2 * self.scale.halvings)) * passes * u64::from(self.scale.foods)
+    }
+
+    /// Where the run stands when it does this to a view.
+    pub fn progress(&self, phase: Phase, view: usize, views: usize) -> Progress {
+        Progress { phase, reduction: self.reduction(), cycle: self.cycle, view, views, done: 0.0 }
+    }
+}
