@@ -103,3 +103,132 @@ fn verdict(
     let nearest = (at.y + 0.5) as usize * source.image.width + (at.x + 0.5) as usize;
     rules.judge(point.z * solution.depth, source.rotation * solution.normal, &state.solutions[nearest])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::World;
+    use crate::views::ViewSets;
+
+    fn abstaining(occluders_abstain: bool) -> Options {
+        Options {
+            depth_tolerance: 0.01,
+            normal_tolerance: 30.0,
+            consistent_share: 0.7,
+            min_consistent: 2,
+            occluders_abstain,
+            ..Options::default()
+        }
+    }
+
+    fn own(depth: f32, degrees: f32) -> Solution {
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        Solution { depth, normal: Vec3::new(sine, 0.0, -cosine), ..Solution::default() }
+    }
+
+    #[test]
+    fn a_source_agrees_within_both_tolerances() {
+        for rules in [true, false].map(|abstain| ConsistencyRules::new(&abstaining(abstain))) {
+            for scale in [4.0, 4000.0] {
+                let judge = |factor, degrees| rules.judge(scale, Vec3::NEG_Z, &own(scale * factor, degrees));
+                assert_eq!(judge(1.0, 0.0), Verdict::Consistent);
+                assert_eq!(judge(1.009, 29.0), Verdict::Consistent);
+                assert_eq!(judge(0.991, -29.0), Verdict::Consistent);
+                assert_eq!(judge(1.011, 0.0), Verdict::Inconsistent);
+                assert_eq!(judge(1.0, 31.0), Verdict::Inconsistent);
+                assert_eq!(judge(1.0, -31.0), Verdict::Inconsistent);
+            }
+            // A source without a solution speaks against.
+            assert_eq!(rules.judge(4.0, Vec3::NEG_Z, &Solution::default()), Verdict::Inconsistent);
+        }
+    }
+
+    #[test]
+    fn what_lies_in_front_abstains_or_speaks_against_as_in_the_paper() {
+        for (abstain, verdict) in [(true, Verdict::Abstains), (false, Verdict::Inconsistent)] {
+            let rules = ConsistencyRules::new(&abstaining(abstain));
+            assert_eq!(rules.judge(4.0, Vec3::NEG_Z, &own(4.0 * 0.985, 0.0)), verdict);
+            assert_eq!(rules.judge(4.0, Vec3::NEG_Z, &own(1.0, 80.0)), verdict);
+            // What lies behind never abstains.
+            assert_eq!(rules.judge(4.0, Vec3::NEG_Z, &own(5.0, 0.0)), Verdict::Inconsistent);
+        }
+    }
+
+    #[test]
+    fn enough_sources_and_a_share_of_them_must_agree() {
+        let rules = |min_consistent, consistent_share| {
+            ConsistencyRules::new(&Options { min_consistent, consistent_share, ..Options::default() })
+        };
+        let seventy = rules(2, 0.7);
+        assert!(!seventy.validates(0, 0));
+        assert!(!seventy.validates(1, 1));
+        assert!(seventy.validates(2, 2));
+        assert!(!seventy.validates(2, 3));
+        assert!(seventy.validates(3, 4));
+        assert!(seventy.validates(7, 10) && !seventy.validates(6, 10));
+        assert!(rules(2, 0.5).validates(2, 4) && !rules(2, 0.5).validates(2, 5));
+        assert!(rules(3, 0.0).validates(3, 100) && !rules(3, 0.0).validates(2, 2));
+    }
+
+    /// The verdicts on the exact wall when the depths of the first sources are multiplied by these factors, at the pixel
+    /// in the middle.
+    fn checked(factors: &[f32], occluders_abstain: bool) -> (u8, bool) {
+        let world = World::five();
+        let mut states = world.exact();
+        for (state, factor) in states[1..].iter_mut().zip(factors) {
+            state.solutions.iter_mut().for_each(|solution| solution.depth *= factor);
+        }
+        let sources: Vec<&ViewState> = states[1..].iter().collect();
+        let rules = ConsistencyRules::new(&abstaining(occluders_abstain));
+        let verdicts = check(&world.reference(), &states[0], &sources, &rules);
+        assert_eq!(verdicts.len(), states[0].solutions.len());
+        verdicts[14 * 36 + 18]
+    }
+
+    #[test]
+    fn the_sources_of_a_pixel_s_set_are_asked() {
+        assert_eq!(checked(&[], true), (4, true));
+        assert_eq!(checked(&[1.05], true), (3, true));
+        assert_eq!(checked(&[1.05, 1.05], true), (2, false));
+        // Two occluders do not count, unless they vote.
+        assert_eq!(checked(&[0.9, 0.9], true), (2, true));
+        assert_eq!(checked(&[0.9, 0.9], false), (2, false));
+        assert_eq!(checked(&[0.9, 0.9, 0.9], true), (1, false));
+    }
+
+    #[test]
+    fn sources_outside_the_set_and_outside_their_image_are_not_asked() {
+        let world = World::five();
+        let mut states = world.exact();
+        let pixels = states[0].solutions.len();
+        let [mut two, mut one] = [ViewSets::empty(pixels, 4), ViewSets::empty(pixels, 4)];
+        for pixel in 0..pixels {
+            two.insert(pixel, 0);
+            two.insert(pixel, 3);
+            one.insert(pixel, 2);
+        }
+        let rules = ConsistencyRules::new(&abstaining(true));
+        let mut verdicts = |sets: ViewSets| {
+            states[0].sets = sets;
+            let sources: Vec<&ViewState> = states[1..].iter().collect();
+            check(&world.reference(), &states[0], &sources, &rules)
+        };
+        let middle = 14 * 36 + 18;
+        assert_eq!(verdicts(one)[middle], (1, false));
+        let verdicts = verdicts(two);
+        assert_eq!(verdicts[middle], (2, true));
+        let outside = verdicts.iter().filter(|verdict| verdict.0 < 2).count();
+        assert!(outside > 0 && outside < pixels / 2, "{outside} of {pixels} are seen by one of the two only");
+        assert!(verdicts.iter().all(|&(count, validated)| validated == (count == 2)));
+    }
+
+    #[test]
+    fn a_pixel_without_a_solution_is_not_validated() {
+        let world = World::five();
+        let mut states = world.exact();
+        states[0].solutions[14 * 36 + 18].depth = 0.0;
+        let sources: Vec<&ViewState> = states[1..].iter().collect();
+        let rules = ConsistencyRules::new(&abstaining(true));
+        assert_eq!(check(&world.reference(), &states[0], &sources, &rules)[14 * 36 + 18], (0, false));
+    }
+}

@@ -21,6 +21,8 @@ mod scene;
 pub mod simd;
 mod solve;
 mod state;
+#[cfg(test)]
+mod testing;
 pub mod views;
 
 pub use error::{Error, Result};

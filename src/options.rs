@@ -219,7 +219,7 @@ impl Options {
         if !descending || self.scales.last().is_none_or(|last| last.halvings != 0) {
             let halvings: Vec<u32> = self.scales.iter().map(|scale| scale.halvings).collect();
             return Err(Error::argument(
-                "scales",
+                "options.scales",
                 format!("{halvings:?}"),
                 "halvings that descend one by one to 0",
             ));

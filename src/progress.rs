@@ -84,3 +84,47 @@ impl<'a> Tracker<'a> {
         self.cancelled.load(Ordering::Relaxed)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Mutex;
+
+    const SOMEWHERE: Progress =
+        Progress { phase: Phase::Search, reduction: 2, cycle: 1, view: 3, views: 5, done: 0.0 };
+
+    #[test]
+    fn the_hook_hears_the_share_that_is_done() {
+        let heard = Mutex::new(Vec::new());
+        let hook = |at: &Progress| {
+            assert_eq!(Progress { done: 0.0, ..*at }, SOMEWHERE);
+            heard.lock().unwrap().push(at.done);
+            ControlFlow::Continue(())
+        };
+        let tracker = Tracker::new(&hook, 8);
+        assert!(!tracker.advance(2, SOMEWHERE));
+        assert!(!tracker.advance(0, SOMEWHERE));
+        tracker.jump_to(6);
+        tracker.advance(1, SOMEWHERE);
+        // Bands are rounded up: more than all is all.
+        tracker.advance(5, SOMEWHERE);
+        assert_eq!(*heard.lock().unwrap(), [0.25, 0.25, 0.875, 1.0]);
+    }
+
+    #[test]
+    fn once_the_hook_broke_everybody_stops() {
+        let calls = AtomicU64::new(0);
+        let hook = |_: &Progress| match calls.fetch_add(1, Ordering::Relaxed) {
+            1 => ControlFlow::Break(()),
+            _ => ControlFlow::Continue(()),
+        };
+        let tracker = Tracker::new(&hook, 8);
+        assert_eq!([(); 4].map(|()| tracker.advance(1, SOMEWHERE)), [false, true, true, true]);
+    }
+
+    #[test]
+    fn a_run_without_work_is_reported_too() {
+        let tracker = Tracker::new(&ignore_progress, 0);
+        assert!(!tracker.advance(0, SOMEWHERE));
+    }
+}

@@ -91,3 +91,122 @@ fn land(camera: &Camera, point: DVec3, normal: DVec3, range: DepthRange) -> Opti
     let is_usable = facing < -f64::from(MIN_FACING) && depth >= range.near && depth <= range.far;
     is_usable.then_some((y as usize * camera.width as usize + x as usize, depth as f32))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{self, RANGE, World};
+    use glam::Vec3;
+
+    /// A world, its target's state, and the exact states of the others.
+    fn target_and_givers() -> (World, ViewState, Vec<ViewState>) {
+        let world = World::five();
+        let mut states = world.exact();
+        let target = states.remove(0);
+        (world, target, states)
+    }
+
+    /// What views of these indices offer to view 0.
+    fn offered(world: &World, target: &ViewState, givers: &[(usize, &ViewState)]) -> Vec<Offer> {
+        let givers: Vec<Giver> =
+            givers.iter().map(|&(view, state)| Giver { view, camera: &world.cameras[view], state }).collect();
+        let offers = offers(&world.cameras[0], target, RANGE, &givers);
+        assert_eq!(offers.len(), target.solutions.len());
+        offers
+    }
+
+    fn count(offers: &[Offer]) -> usize {
+        offers.iter().filter(|offer| offer.depth > 0.0).count()
+    }
+
+    #[test]
+    fn an_offer_lands_where_its_point_projects_with_its_plane_s_depth_there() {
+        let (world, target, givers) = target_and_givers();
+        let offers = offered(&world, &target, &[(1, &givers[0])]);
+        let camera = &world.cameras[0];
+        assert!(count(&offers) > camera.pixels() / 2);
+        for (pixel, offer) in offers.iter().enumerate().filter(|(_, offer)| offer.depth > 0.0) {
+            // Points land beside the pixel's centre, and the wall is slanted: only its plane is exact.
+            assert!((offer.depth / testing::depth(camera, pixel) - 1.0).abs() < 1e-5);
+            assert!(offer.normal.distance(testing::normal(camera)) < 1e-5);
+            assert_eq!(offer.cost, 0.1);
+        }
+    }
+
+    #[test]
+    fn a_single_solution_lands_at_a_single_pixel() {
+        let (world, target, mut givers) = target_and_givers();
+        let source = 10 * 36 + 20;
+        for (pixel, solution) in givers[0].solutions.iter_mut().enumerate() {
+            solution.consistent = u8::from(pixel == source);
+        }
+        let offers = offered(&world, &target, &[(1, &givers[0])]);
+        let camera = &world.cameras[1];
+        let depth = f64::from(givers[0].solutions[source].depth);
+        let point = camera.unproject(testing::place(camera, source), depth);
+        let (x, y) = world.cameras[0].nearest_pixel(world.cameras[0].project(point).unwrap().0).unwrap();
+        assert_eq!(count(&offers), 1);
+        assert!(offers[(y * 36 + x) as usize].depth > 0.0);
+    }
+
+    #[test]
+    fn validated_pixels_get_no_offer() {
+        let (world, mut target, givers) = target_and_givers();
+        for solution in &mut target.solutions[..500] {
+            solution.validated = true;
+        }
+        let offers = offered(&world, &target, &[(1, &givers[0]), (2, &givers[1])]);
+        assert_eq!(count(&offers[..500]), 0);
+        assert!(count(&offers[500..]) > 250);
+    }
+
+    #[test]
+    fn only_what_a_source_confirmed_is_offered() {
+        let (world, target, mut givers) = target_and_givers();
+        givers[0].solutions.iter_mut().for_each(|solution| solution.consistent = 0);
+        assert_eq!(count(&offered(&world, &target, &[(1, &givers[0])])), 0);
+        givers[0].solutions.iter_mut().for_each(|solution| {
+            *solution = Solution { consistent: 1, depth: 0.0, ..*solution };
+        });
+        assert_eq!(count(&offered(&world, &target, &[(1, &givers[0])])), 0);
+    }
+
+    #[test]
+    fn the_cheapest_offer_is_taken_and_of_equals_that_of_the_lowest_view_in_any_order() {
+        let (mut world, target, mut givers) = target_and_givers();
+        // Views at the same place offer the same points: their normals tell who was taken.
+        (world.cameras[2], world.cameras[3]) = (world.cameras[1], world.cameras[1]);
+        let tilt = |state: &ViewState, x: f32, cost: f32| {
+            let mut state = state.clone();
+            state.solutions.iter_mut().for_each(|s| s.normal = (s.normal + x * Vec3::X).normalize());
+            state.cost.fill(cost);
+            state
+        };
+        givers[1] = tilt(&givers[0], 0.1, 0.1);
+        givers[2] = tilt(&givers[0], 0.2, 0.05);
+        let (one, two, three) = ((1, &givers[0]), (2, &givers[1]), (3, &givers[2]));
+        let only = |giver| offered(&world, &target, &[giver]);
+        assert_ne!(only(one), only(two));
+        assert_eq!(offered(&world, &target, &[one, two]), only(one));
+        assert_eq!(offered(&world, &target, &[two, one]), only(one));
+        for order in [[one, two, three], [three, one, two], [two, three, one]] {
+            assert_eq!(offered(&world, &target, &order), only(three));
+        }
+    }
+
+    #[test]
+    fn without_givers_nothing_is_offered() {
+        let (world, target, _) = target_and_givers();
+        assert_eq!(offered(&world, &target, &[]), vec![Offer::default(); target.solutions.len()]);
+    }
+
+    #[test]
+    fn a_plane_beyond_the_target_s_range_or_turned_away_is_not_offered() {
+        let (world, target, mut givers) = target_and_givers();
+        let short = DepthRange { near: 1.0, far: 3.0 };
+        let giver = Giver { view: 1, camera: &world.cameras[1], state: &givers[0] };
+        assert_eq!(count(&offers(&world.cameras[0], &target, short, &[giver])), 0);
+        givers[0].solutions.iter_mut().for_each(|solution| solution.normal = -solution.normal);
+        assert_eq!(count(&offered(&world, &target, &[(1, &givers[0])])), 0);
+    }
+}

@@ -84,3 +84,74 @@ fn surface(camera: &Camera, solutions: &[Solution]) -> Vec<SlantedPlane> {
     };
     solutions.par_iter().enumerate().map(plane).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{self, RANGE};
+
+    #[test]
+    fn a_plane_is_handed_up_exactly_also_to_odd_sizes() {
+        for size in [(36, 28), (35, 27), (5, 3), (2, 1), (1, 1)] {
+            let fine = testing::camera(0.7, size);
+            let coarse = fine.halved();
+            let refined = testing::exact(&coarse).refined(&coarse, &fine, RANGE);
+            assert_eq!(refined.solutions.len(), fine.pixels());
+            for (pixel, solution) in refined.solutions.iter().enumerate() {
+                let depth = testing::depth(&fine, pixel);
+                assert!((solution.depth / depth - 1.0).abs() < 1e-6, "{} instead of {depth}", solution.depth);
+                assert_eq!(solution.normal, testing::normal(&fine));
+                assert_eq!(solution.consistent, 1);
+            }
+        }
+    }
+
+    #[test]
+    fn four_fine_pixels_follow_their_coarse_one() {
+        let fine = testing::camera(0.0, (6, 4));
+        let coarse = fine.halved();
+        let mut state = testing::exact(&coarse);
+        let none = 3 + 1;
+        state.solutions[none] = Solution::default();
+        state.solutions[none + 1].validated = true;
+        let refined = state.refined(&coarse, &fine, RANGE);
+        for pixel in 0..24 {
+            let parent = pixel / 6 / 2 * 3 + pixel % 6 / 2;
+            assert_eq!(refined.solutions[pixel].depth == 0.0, parent == none);
+            assert_eq!(refined.solutions[pixel].validated, parent == none + 1);
+            assert_eq!(refined.surface[pixel].inverse_depth > 0.0, parent == none + 1);
+        }
+    }
+
+    #[test]
+    fn a_plane_that_leaves_the_range_between_pixels_keeps_its_depth() {
+        let fine = testing::camera(0.0, (6, 4));
+        let coarse = fine.halved();
+        let state = testing::exact(&coarse);
+        let depths = || state.solutions.iter().map(|solution| f64::from(solution.depth));
+        // No more than the coarse depths themselves.
+        let range = DepthRange { near: depths().fold(f64::MAX, f64::min), far: depths().fold(0.0, f64::max) };
+        for solution in state.refined(&coarse, &fine, range).solutions {
+            assert!((range.near as f32..=range.far as f32).contains(&solution.depth));
+        }
+    }
+
+    #[test]
+    fn marking_shows_the_validated_solutions_to_other_views() {
+        let camera = testing::camera(0.0, (6, 4));
+        let mut state = testing::exact(&camera);
+        let verdicts: Vec<(u8, bool)> = (0..24).map(|pixel| (pixel, pixel % 3 == 0)).collect();
+        state.mark(&camera, &verdicts);
+        assert_eq!(state.validated(), 8);
+        for (pixel, solution) in state.solutions.iter().enumerate() {
+            assert_eq!((solution.consistent, solution.validated), verdicts[pixel]);
+            let plane = &state.surface[pixel];
+            let shown = if pixel % 3 == 0 { 1.0 / solution.depth } else { 0.0 };
+            assert_eq!(plane.inverse_depth, shown);
+            if solution.validated && pixel % 6 < 5 {
+                let right = 1.0 / plane.inverse_depth_at(1.0, 0.0);
+                assert!((right / testing::depth(&camera, pixel + 1) - 1.0).abs() < 1e-5);
+            }
+        }
+    }
+}

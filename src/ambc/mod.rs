@@ -8,6 +8,8 @@ mod onlooker;
 mod random;
 mod schedule;
 mod scout;
+#[cfg(test)]
+mod tests;
 
 pub use colony::Offer;
 pub use cost::CostRules;

@@ -5,6 +5,7 @@ mod layouts;
 
 use layouts::{check_cloud, check_maps, map};
 use serde_json::Value;
+use skep::simd::Level;
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -112,6 +113,25 @@ fn info_tells_version_machine_and_every_option_of_both_presets() {
         let first_part = value.split("; ").next().unwrap();
         assert!(row.contains(first_part), "{row} lacks {first_part}");
     }
+}
+
+#[test]
+fn the_environment_forces_a_simd_level_lowered_to_the_machine_s() {
+    let level = |forced: Option<&str>| {
+        let mut info = command(&["info"]);
+        info.env_remove("SKEP_SIMD").envs(forced.map(|level| ("SKEP_SIMD", level)));
+        let output = info.output().unwrap();
+        assert!(output.status.success());
+        let printed = text(&output.stdout).to_owned();
+        let level = printed.lines().find_map(|line| line.strip_prefix("SIMD level: "));
+        level.expect("info tells the level").to_owned()
+    };
+    let best = Level::ALL.into_iter().rfind(|level| level.is_available()).unwrap();
+    assert_eq!(level(None), best.name());
+    for forced in Level::ALL {
+        assert_eq!(level(Some(forced.name())), forced.min(best).name());
+    }
+    assert_eq!(level(Some("")), best.name());
 }
 
 #[test]

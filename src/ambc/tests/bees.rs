@@ -1,0 +1,186 @@
+//! Each kind of bee.
+
+use super::*;
+use crate::ambc::MIN_FACING;
+use crate::ambc::colony::{Colonies, best_first, colour};
+use crate::ambc::food::cost_to_beat;
+use crate::ambc::random::Random;
+use crate::ambc::{employed, onlooker, scout};
+use crate::testing::window;
+use glam::Vec3;
+
+// Employed bees.
+
+#[test]
+fn employed_bees_keep_only_what_is_better_and_count_their_trials() {
+    let (world, window) = (World::five(), window());
+    let reference = world.reference();
+    let mut evaluator = standing(&reference, &window, &options(), false);
+    let mut foods = [1.0, 1.1, 0.7, 1.5].map(|factor| evaluated(&mut evaluator, wall(&world, PIXEL, factor)));
+    let mut random = Random::new(1, 2);
+    let mut improved = 0;
+    for _ in 0..100 {
+        let before = foods;
+        employed::send(&mut evaluator, &mut foods, &mut random);
+        for (before, after) in before.iter().zip(&foods) {
+            if after == &(FoodSource { trials: before.trials + 1, ..*before }) {
+                continue;
+            }
+            improved += 1;
+            assert!(after.cost < before.cost && after.trials == 0);
+            assert_eq!(after.cost, evaluator.cost(after, f32::INFINITY), "the cost kept is the true one");
+            let in_one_group = (after.depth == before.depth) != (after.normal == before.normal);
+            assert!(in_one_group, "depth or normal moves, not both");
+        }
+    }
+    assert!(improved > 10);
+    assert!(foods.iter().all(|food| food.cost < 0.2), "{foods:?}");
+}
+
+#[test]
+fn employed_bees_stay_in_the_depth_range_and_on_the_visible_side() {
+    let (world, window) = (World::five(), window());
+    let reference = world.reference();
+    let mut evaluator = standing(&reference, &window, &options(), false);
+    let ray = evaluator.ray();
+    let grazing = [Vec3::new(-0.99, 0.0, -0.2), Vec3::new(0.99, 0.1, -0.2)].map(|normal| normal.normalize());
+    let mut kept = 0;
+    for seed in 0..2000 {
+        // Costs that anything improves on: every valid trial is kept.
+        let mut foods = [
+            FoodSource { cost: 9.0, ..FoodSource::new(reference.near, grazing[0]) },
+            FoodSource { cost: 9.0, ..FoodSource::new(reference.far, grazing[1]) },
+        ];
+        employed::send(&mut evaluator, &mut foods, &mut Random::new(7, seed));
+        for food in foods {
+            assert!((reference.near..=reference.far).contains(&food.depth), "{food:?}");
+            assert!(food.normal.dot(ray) < -MIN_FACING, "{food:?}");
+            assert!((food.normal.length() - 1.0).abs() < 1e-5);
+            kept += usize::from(food.cost < 9.0);
+        }
+    }
+    assert!(kept > 500, "{kept} trials were kept");
+}
+
+// Onlooker bees.
+
+/// Colonies in which every pixel of the other colour has the wall as its best, its depth multiplied.
+fn neighbours(world: &World, factor: f32, validated: bool) -> Colonies {
+    let (width, height) = (world.images[0].width, world.images[0].height);
+    let mut colonies = Colonies::new(width, height, 1);
+    let other = 1 - colour(PIXEL.0, PIXEL.1);
+    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        if colour(x, y) == other {
+            let at = y * colonies.row_len() + x / 2;
+            colonies.foods[at] = FoodSource { validated, cost: 0.0, ..wall(world, (x, y), factor) };
+        }
+    }
+    colonies
+}
+
+#[test]
+fn onlookers_bring_a_neighbour_s_plane_to_the_pixel() {
+    let (world, window) = (World::five(), window());
+    let reference = world.reference();
+    let mut evaluator = standing(&reference, &window, &options(), false);
+    let neighbours = neighbours(&world, 1.0, false);
+    let wrong = evaluated(&mut evaluator, wall(&world, PIXEL, 1.2));
+    for seed in 0..100 {
+        let mut foods = [FoodSource { trials: 5, ..wrong }];
+        onlooker::send(&mut evaluator, &mut foods, &neighbours, PIXEL, 0.0, &mut Random::new(3, seed));
+        let [food] = foods;
+        // The wall is slanted: a neighbour's depth is another one.
+        assert!((food.depth / wall(&world, PIXEL, 1.0).depth - 1.0).abs() < 1e-5, "{food:?}");
+        assert_eq!((food.normal, food.trials), (testing::normal(&world.cameras[0]), 0));
+        assert_eq!(food.cost, evaluator.cost(&food, f32::INFINITY));
+    }
+}
+
+#[test]
+fn a_slightly_dearer_plane_is_taken_from_a_validated_neighbour_only_and_at_its_true_cost() {
+    const REWARD: f32 = 0.05;
+    let (world, window) = (World::five(), window());
+    let reference = world.reference();
+    let mut evaluator = standing(&reference, &window, &options(), false);
+    let own = evaluated(&mut evaluator, wall(&world, PIXEL, 1.0));
+    let mut cost = |factor| evaluator.cost(&wall(&world, PIXEL, factor), f32::INFINITY);
+    let dearer = |cost: f32| (own.cost + 0.01..cost_to_beat(own.cost, REWARD) - 0.01).contains(&cost);
+    let factors = || (1..400).map(|step| 1.0 + step as f32 * 5e-4);
+    let slightly = factors().find(|&factor| dearer(cost(factor))).expect("a plane slightly dearer");
+    let far_off = factors().find(|&factor| cost(factor) > cost_to_beat(own.cost, REWARD) + 0.05);
+    let far_off = far_off.expect("a plane much dearer");
+
+    let mut after = |factor: f32, validated: bool, reward: f32| {
+        let neighbours = neighbours(&world, factor, validated);
+        let mut foods = [own];
+        onlooker::send(&mut evaluator, &mut foods, &neighbours, PIXEL, reward, &mut Random::new(3, 4));
+        (foods[0], evaluator.cost(&foods[0], f32::INFINITY))
+    };
+    let kept = FoodSource { trials: 1, ..own };
+    let (taken, true_cost) = after(slightly, true, REWARD);
+    assert!(taken.validated && taken.depth > own.depth && taken.cost > own.cost, "{taken:?}");
+    assert_eq!(taken.cost, true_cost, "the reward is not stored");
+    assert_eq!(after(slightly, false, REWARD).0, kept);
+    assert_eq!(after(slightly, true, 0.0).0, kept);
+    assert_eq!(after(far_off, true, REWARD).0, kept);
+}
+
+#[test]
+fn neighbours_that_were_never_searched_bring_nothing() {
+    let (world, window) = (World::five(), window());
+    let reference = world.reference();
+    let mut evaluator = standing(&reference, &window, &options(), false);
+    let own = evaluated(&mut evaluator, wall(&world, PIXEL, 1.3));
+    let mut foods = [own];
+    let empty = Colonies::new(36, 28, 1);
+    onlooker::send(&mut evaluator, &mut foods, &empty, PIXEL, 0.1, &mut Random::new(3, 4));
+    assert_eq!(foods, [FoodSource { trials: 1, ..own }]);
+}
+
+#[test]
+fn onlookers_visit_the_other_colour_only() {
+    let mut offsets = onlooker::OFFSETS.to_vec();
+    assert!(offsets.iter().all(|(x, y)| (x + y) % 2 != 0));
+    offsets.sort_unstable();
+    offsets.dedup();
+    assert_eq!(offsets.len(), 20);
+    // Mirroring at a border is a visit too.
+    assert!(offsets.iter().all(|&(x, y)| offsets.contains(&(-x, y)) && offsets.contains(&(x, -y))));
+}
+
+// Scout bees.
+
+#[test]
+fn a_scout_replaces_the_stalest_beyond_the_limit_and_never_the_best() {
+    let (world, window) = (World::five(), window());
+    let reference = world.reference();
+    let mut evaluator = standing(&reference, &window, &options(), false);
+    let mut random = Random::new(5, 6);
+    let food = evaluated(&mut evaluator, wall(&world, PIXEL, 1.1));
+    let mut foods = [50, 11, 13, 10, 13].map(|trials| FoodSource { trials, ..food });
+    let mut replaced = Vec::new();
+    for _ in 0..5 {
+        let before = foods;
+        scout::send(&mut evaluator, &mut foods, 10, &mut random);
+        let changed: Vec<usize> = (0..foods.len()).filter(|&index| foods[index] != before[index]).collect();
+        for &index in &changed {
+            let food = foods[index];
+            assert!((reference.near..=reference.far).contains(&food.depth));
+            assert_eq!((food.trials, food.validated), (0, false));
+            assert_eq!(food.cost, evaluator.cost(&food, f32::INFINITY), "found planes are kept at any cost");
+        }
+        replaced.push(changed);
+    }
+    assert_eq!(replaced, [vec![2], vec![4], vec![1], vec![], vec![]]);
+}
+
+#[test]
+fn the_best_stands_first_with_its_trials_and_of_equals_the_earlier() {
+    let food = |cost, trials| FoodSource { cost, trials, ..FoodSource::new(1.0, Vec3::NEG_Z) };
+    let mut foods = [food(0.5, 1), food(0.2, 2), food(0.2, 3)];
+    best_first(&mut foods);
+    assert_eq!(foods, [food(0.2, 2), food(0.5, 1), food(0.2, 3)]);
+    let mut unevaluated = [food(f32::INFINITY, 1), food(f32::INFINITY, 2)];
+    best_first(&mut unevaluated);
+    assert_eq!(unevaluated[0].trials, 1);
+}

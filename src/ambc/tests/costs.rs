@@ -1,0 +1,128 @@
+//! Costs of hypotheses over the views of a pixel.
+
+use super::*;
+use crate::ambc::food::fitness;
+use crate::testing::window;
+
+#[test]
+fn the_wall_costs_less_than_planes_before_and_behind_it() {
+    let (world, window) = (World::five(), window());
+    let reference = world.reference();
+    for aggregation in [Aggregation::AllViews, Aggregation::BestViews(3)] {
+        let mut evaluator = standing(&reference, &window, &Options { aggregation, ..options() }, false);
+        let mut cost = |factor| evaluator.cost(&wall(&world, PIXEL, factor), f32::INFINITY);
+        let right = cost(1.0);
+        assert!(right < 0.03, "{right}");
+        for factor in [0.8, 0.9, 0.97, 1.03, 1.1, 1.2] {
+            assert!(cost(factor) > right + 0.02, "{factor}: {} and {right}", cost(factor));
+        }
+    }
+}
+
+#[test]
+fn a_cost_is_the_sum_over_all_but_one_or_the_mean_of_the_best() {
+    let (world, window) = (World::five(), window());
+    let reference = world.reference();
+    let food = wall(&world, PIXEL, 1.1);
+    // Pairs of views give the costs of the single ones: (a + b) / 1.
+    let cost_of = |views: &[usize], aggregation| {
+        let options = Options { aggregation, ..options() };
+        let mut evaluator = standing(&reference, &window, &options, false);
+        let mut set = [0];
+        views.iter().for_each(|&view| ViewSets::insert_into(&mut set, view));
+        evaluator.go_to(PIXEL.0, PIXEL.1, &set);
+        evaluator.cost(&food, f32::INFINITY)
+    };
+    let pair = |a, b| cost_of(&[a, b], Aggregation::AllViews);
+    let first = (pair(0, 1) + pair(0, 2) - pair(1, 2)) / 2.0;
+    let mut single: Vec<f32> =
+        (0..4).map(|view| if view == 0 { first } else { pair(0, view) - first }).collect();
+    assert!(single.iter().all(|cost| (0.0..=2.0).contains(cost)), "{single:?}");
+
+    let all = cost_of(&[0, 1, 2, 3], Aggregation::AllViews);
+    assert!((all - single.iter().sum::<f32>() / 3.0).abs() < 1e-5);
+    single.sort_by(f32::total_cmp);
+    for best in 1..=4 {
+        let mean = single[..best].iter().sum::<f32>() / best as f32;
+        let cost = cost_of(&[0, 1, 2, 3], Aggregation::BestViews(best as u32));
+        assert!((cost - mean).abs() < 1e-5, "the best {best}: {cost} instead of {mean}");
+    }
+    // More than there are: those there are.
+    let cost = cost_of(&[0, 1, 2, 3], Aggregation::BestViews(8));
+    assert!((cost - single.iter().sum::<f32>() / 4.0).abs() < 1e-5);
+    for aggregation in [Aggregation::AllViews, Aggregation::BestViews(1)] {
+        assert_eq!(cost_of(&[1], aggregation), f32::INFINITY);
+        assert_eq!(cost_of(&[], aggregation), f32::INFINITY);
+    }
+}
+
+#[test]
+fn giving_up_early_changes_no_decision() {
+    let (world, window) = (World::five(), window());
+    let reference = world.reference();
+    for aggregation in [Aggregation::AllViews, Aggregation::BestViews(2), Aggregation::BestViews(4)] {
+        let mut evaluator = standing(&reference, &window, &Options { aggregation, ..options() }, false);
+        for factor in [0.7, 0.9, 0.99, 1.0, 1.05, 1.4] {
+            let food = wall(&world, PIXEL, factor);
+            let cost = evaluator.cost(&food, f32::INFINITY);
+            for bound in [0.0, 0.01, 0.1, 0.5, cost, cost * 1.0001, 3.0] {
+                let expected = if cost < bound { cost } else { f32::INFINITY };
+                assert_eq!(evaluator.cost(&food, bound), expected);
+            }
+        }
+        assert!(evaluator.counts.early_outs > 0);
+    }
+}
+
+#[test]
+fn a_view_without_the_hypothesis_in_its_image_does_not_count() {
+    // The third camera sees another part of the world.
+    let mut world = World::new(&[0.0, 0.8, -0.8, 0.4], (36, 28));
+    let window = window();
+    let options = Options { aggregation: Aggregation::BestViews(8), ..options() };
+    let cost = |world: &World| {
+        let reference = world.reference();
+        let mut evaluator = standing(&reference, &window, &options, false);
+        evaluator.cost(&wall(world, PIXEL, 1.05), f32::INFINITY)
+    };
+    world.cameras[3].cx += 100.0;
+    let without = cost(&world);
+    let pair = World::new(&[0.0, 0.8, -0.8], (36, 28));
+    assert_eq!(without, cost(&pair));
+}
+
+#[test]
+fn disagreeing_with_validated_depths_costs_up_to_a_limit() {
+    let (mut world, window) = (World::five(), window());
+    let options = Options {
+        aggregation: Aggregation::BestViews(8),
+        geometric_weight: 0.2,
+        geometric_limit: 3.0,
+        geometric_unknown: 1.5,
+        ..options()
+    };
+    let penalty = |world: &World, factor| {
+        let reference = world.reference();
+        let food = wall(world, PIXEL, factor);
+        let [with, without] = [true, false]
+            .map(|geometric| standing(&reference, &window, &options, geometric).cost(&food, f32::INFINITY));
+        with - without
+    };
+    // Nothing is validated yet: 0.2 for each of 1.5 percent.
+    assert!((penalty(&world, 1.0) - 0.3).abs() < 1e-5);
+    for view in 1..5 {
+        let mut state = testing::exact(&world.cameras[view]);
+        let validated = vec![(4, true); state.solutions.len()];
+        state.mark(&world.cameras[view], &validated);
+        world.surfaces[view] = state.surface;
+    }
+    assert!(penalty(&world, 1.0).abs() < 1e-3);
+    let off = penalty(&world, 1.01);
+    assert!((0.1..0.3).contains(&off), "{off} for a percent");
+    assert!((penalty(&world, 1.2) - 0.6).abs() < 1e-5, "the limit of 3 percent");
+}
+
+#[test]
+fn fitness_falls_as_the_cost_grows() {
+    assert_eq!([0.0, 1.0, f32::INFINITY].map(fitness), [1.0, 0.5, 0.0]);
+}

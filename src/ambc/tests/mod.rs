@@ -1,0 +1,46 @@
+//! The bees and the search one by one, before a wall of which everything is known.
+
+mod bees;
+mod costs;
+mod planes;
+mod search;
+
+use super::cost::Evaluator;
+use super::{CostRules, FoodSource};
+use crate::kernels::Window;
+use crate::options::{Aggregation, Options};
+use crate::simd::Scalar;
+use crate::testing::{self, World};
+use crate::views::{Reference, ViewSets};
+
+/// A pixel that all views see.
+const PIXEL: (usize, usize) = (18, 14);
+
+fn options() -> Options {
+    Options { aggregation: Aggregation::BestViews(3), ..Options::default() }
+}
+
+/// An evaluator that stands at the pixel with all sources in its set.
+fn standing<'a>(
+    reference: &'a Reference<'a>,
+    window: &'a Window,
+    options: &Options,
+    with_geometric_term: bool,
+) -> Evaluator<'a, Scalar> {
+    let mut evaluator =
+        Evaluator::new(Scalar, reference, window, CostRules::new(options, with_geometric_term));
+    let mut set = vec![0; reference.sources.len().div_ceil(32)];
+    ViewSets::fill_words(&mut set, reference.sources.len());
+    evaluator.go_to(PIXEL.0, PIXEL.1, &set);
+    evaluator
+}
+
+/// The wall at a pixel, its depth multiplied.
+fn wall(world: &World, (x, y): (usize, usize), factor: f32) -> FoodSource {
+    let camera = &world.cameras[0];
+    FoodSource::new(testing::depth(camera, y * camera.width as usize + x) * factor, testing::normal(camera))
+}
+
+fn evaluated(evaluator: &mut Evaluator<Scalar>, food: FoodSource) -> FoodSource {
+    FoodSource { cost: evaluator.cost(&food, f32::INFINITY), ..food }
+}

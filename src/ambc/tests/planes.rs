@@ -1,0 +1,66 @@
+//! Planes drawn, moved and shown.
+
+use super::*;
+use crate::ambc::random::Random;
+use crate::kernels::SlantedPlane;
+use glam::Vec3;
+
+#[test]
+fn random_planes_fill_their_stratum_of_inverse_depth_and_face_the_camera() {
+    let world = World::five();
+    let reference = world.reference();
+    let ray = reference.ray(3.0, 25.0);
+    let mut random = Random::new(8, 9);
+    let (nearest, farthest) = (1.0 / reference.near, 1.0 / reference.far);
+    let strata = 5;
+    for stratum in 0..strata {
+        let part = (stratum as f32 / strata as f32, (stratum + 1) as f32 / strata as f32);
+        let mut halves = [0; 2];
+        for _ in 0..2000 {
+            let food = FoodSource::random(&reference, ray, &mut random, part);
+            let share = (1.0 / food.depth - farthest) / (nearest - farthest);
+            assert!((part.0 - 1e-5..=part.1 + 1e-5).contains(&share), "{share} is not in {part:?}");
+            assert!((reference.near..=reference.far).contains(&food.depth));
+            assert!(food.normal.dot(ray) < 0.0 && (food.normal.length() - 1.0).abs() < 1e-5);
+            halves[usize::from(share > (part.0 + part.1) / 2.0)] += 1;
+        }
+        assert!(halves.iter().all(|&count| count > 850), "{halves:?}");
+    }
+}
+
+#[test]
+fn a_plane_transferred_to_another_pixel_is_the_same_plane() {
+    let world = World::five();
+    let reference = world.reference();
+    let from = wall(&world, PIXEL, 1.0);
+    let ray = |(x, y): (usize, usize)| reference.ray(x as f32, y as f32);
+    for to in [(19, 14), (18, 9), (16, 15), (0, 0), (35, 27)] {
+        let offset = (to.0 as f32 - PIXEL.0 as f32, to.1 as f32 - PIXEL.1 as f32);
+        let moved = from.transferred(&reference, ray(PIXEL), ray(to), offset).unwrap();
+        assert!((moved.depth / wall(&world, to, 1.0).depth - 1.0).abs() < 1e-5);
+        assert_eq!(moved.normal, from.normal);
+    }
+    let leaves_the_range = FoodSource::new(reference.near, Vec3::new(0.7, 0.0, -0.7).normalize());
+    let outcomes = [(-5.0, (13, 14)), (5.0, (23, 14))]
+        .map(|(dx, to)| leaves_the_range.transferred(&reference, ray(PIXEL), ray(to), (dx, 0.0)).is_some());
+    assert!(outcomes[0] != outcomes[1], "one way the plane comes nearer than the range");
+}
+
+#[test]
+fn a_validated_plane_shown_by_a_source_is_the_wall_between_its_pixels_too() {
+    let mut world = World::five();
+    let mut state = testing::exact(&world.cameras[1]);
+    let validated = vec![(2, true); state.solutions.len()];
+    state.mark(&world.cameras[1], &validated);
+    world.surfaces[1] = state.surface;
+    let reference = world.reference();
+    let source = &reference.sources[0];
+    let shown = source.validated_at(10.4, 7.7).unwrap();
+    let SlantedPlane { inverse_depth, .. } = world.surfaces[1][8 * 36 + 10];
+    assert_eq!(shown.nearest, inverse_depth);
+    let camera = &world.cameras[1];
+    let [a, b] = [8 * 36 + 10, 8 * 36 + 11].map(|pixel| 1.0 / testing::depth(camera, pixel));
+    let up = 1.0 / testing::depth(camera, 7 * 36 + 10) - a;
+    assert!((shown.exact - (a + 0.4 * (b - a) + 0.3 * up)).abs() < 1e-6);
+    assert!(reference.sources[1].validated_at(10.4, 7.7).is_none());
+}

@@ -1,0 +1,127 @@
+//! A small world for the unit tests of single steps: cameras in a row before a slanted wall with texture, of which
+//! everything is known exactly.
+
+use crate::camera::{Camera, Plane};
+use crate::image::{PackedImage, Picture};
+use crate::kernels::{SlantedPlane, Window};
+use crate::scene::DepthRange;
+use crate::state::{Solution, ViewState};
+use crate::views::{Reference, Source, ViewSets};
+use glam::{DMat3, DVec2, DVec3, Vec3};
+
+/// The wall's depths lie well inside.
+pub const RANGE: DepthRange = DepthRange { near: 2.0, far: 12.0 };
+
+/// The first view is the reference, the others are its sources.
+pub struct World {
+    pub cameras: Vec<Camera>,
+    pub images: Vec<PackedImage>,
+    /// The validated solutions the sources show; none at first.
+    pub surfaces: Vec<Vec<SlantedPlane>>,
+}
+
+/// Unit normal of the wall, which goes through (0, 0, 5).
+fn wall_normal() -> DVec3 {
+    DVec3::new(0.2, 0.1, -1.0).normalize()
+}
+
+fn grey(point: DVec3) -> u8 {
+    let waves = (7.0 * point.x + 3.0 * point.y).sin() + (5.0 * point.y - 3.0 * point.x + 1.0).sin();
+    (127.0 + 55.0 * waves).round() as u8
+}
+
+/// The wall in a camera's frame.
+fn wall(camera: &Camera) -> Plane {
+    let normal = camera.rotation * wall_normal();
+    Plane { normal, distance: -normal.dot(camera.to_camera(DVec3::Z * 5.0)) }
+}
+
+/// Column and row of a pixel.
+pub fn place(camera: &Camera, pixel: usize) -> DVec2 {
+    let width = camera.width as usize;
+    DVec2::new((pixel % width) as f64, (pixel / width) as f64)
+}
+
+/// Depth of the wall at a pixel.
+pub fn depth(camera: &Camera, pixel: usize) -> f32 {
+    wall(camera).depth(camera, place(camera, pixel)) as f32
+}
+
+/// Unit normal of the wall in a camera's frame.
+pub fn normal(camera: &Camera) -> Vec3 {
+    wall(camera).normal.as_vec3()
+}
+
+/// The wall at every pixel, each solution consistent with one source and not validated, at a cost of 0.1.
+pub fn exact(camera: &Camera) -> ViewState {
+    let solution = |pixel| Solution {
+        depth: depth(camera, pixel),
+        normal: normal(camera),
+        consistent: 1,
+        validated: false,
+    };
+    ViewState {
+        solutions: (0..camera.pixels()).map(solution).collect(),
+        cost: vec![0.1; camera.pixels()],
+        ..ViewState::default()
+    }
+}
+
+/// A camera at `x` on a line parallel to the wall's foot, turned so that it sees the same part of the wall.
+pub fn camera(x: f64, (width, height): (u32, u32)) -> Camera {
+    let rotation = DMat3::from_rotation_y((x / 5.0).atan());
+    Camera {
+        width,
+        height,
+        fx: 40.0,
+        fy: 42.0,
+        cx: f64::from(width) / 2.0,
+        cy: f64::from(height) / 2.0,
+        rotation,
+        translation: -(rotation * DVec3::X * x),
+    }
+}
+
+impl World {
+    /// Cameras at these places of the line with images of this size.
+    pub fn new(places: &[f64], size: (u32, u32)) -> World {
+        let cameras: Vec<Camera> = places.iter().map(|&x| camera(x, size)).collect();
+        let image = |camera: &Camera| {
+            let point = |pixel| camera.unproject(place(camera, pixel), f64::from(depth(camera, pixel)));
+            let greys = (0..camera.pixels()).map(|pixel| grey(point(pixel))).collect();
+            PackedImage::new(&Picture::from_grey(size.0, size.1, greys).unwrap())
+        };
+        World {
+            images: cameras.iter().map(image).collect(),
+            surfaces: vec![Vec::new(); cameras.len()],
+            cameras,
+        }
+    }
+
+    /// Five cameras whose images mostly overlap.
+    pub fn five() -> World {
+        World::new(&[0.0, 0.8, -0.8, 1.4, -1.4], (36, 28))
+    }
+
+    /// The first view with all others as sources.
+    pub fn reference(&self) -> Reference<'_> {
+        let mut reference = Reference::new(&self.cameras[0], &self.images[0], RANGE);
+        for view in 1..self.cameras.len() {
+            let (image, surface) = (&self.images[view], &self.surfaces[view]);
+            reference.sources.push(Source::new(&self.cameras[0], &self.cameras[view], image, surface));
+        }
+        reference
+    }
+
+    /// The exact states of all views; the reference's pixels have all sources in their sets.
+    pub fn exact(&self) -> Vec<ViewState> {
+        let mut states: Vec<ViewState> = self.cameras.iter().map(exact).collect();
+        states[0].sets = ViewSets::full(self.cameras[0].pixels(), self.cameras.len() - 1);
+        states
+    }
+}
+
+/// The window of the tests.
+pub fn window() -> Window {
+    Window::new(5, 2, 5.0, 0.2, 1e-5)
+}

@@ -1,0 +1,198 @@
+//! Every back-end's operations against the scalar ones: the same bits.
+
+use proptest::prelude::*;
+use skep::simd::{LANES, Level, Scalar, Simd, Task, dispatch};
+
+type Lanes = [f32; LANES];
+
+/// The back-ends of this machine.
+fn levels() -> impl Iterator<Item = Level> {
+    Level::ALL.into_iter().filter(|level| level.is_available())
+}
+
+/// An operation written once for all back-ends.
+trait Operation: Copy {
+    fn run<S: Simd>(self, simd: S) -> Vec<Lanes>;
+}
+
+struct Vectorized<O>(O);
+
+impl<O: Operation> Task for Vectorized<O> {
+    type Output = (Level, Vec<Lanes>);
+
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        (S::LEVEL, simd.vectorize(|| self.0.run(simd)))
+    }
+}
+
+/// The bits, with one pattern for all that is not a number: which one is left open.
+fn bits(lanes: &[Lanes]) -> Vec<u32> {
+    let bits = |lane: &f32| if lane.is_nan() { f32::NAN.to_bits() } else { lane.to_bits() };
+    lanes.iter().flatten().map(bits).collect()
+}
+
+fn check(operation: impl Operation) -> Result<(), TestCaseError> {
+    let expected = operation.run(Scalar);
+    for level in levels() {
+        let (ran, lanes) = dispatch(level, Vectorized(operation));
+        prop_assert_eq!(ran, level);
+        prop_assert_eq!(
+            bits(&lanes),
+            bits(&expected),
+            "{} gives {:?} and scalar {:?}",
+            level.name(),
+            lanes,
+            expected
+        );
+    }
+    Ok(())
+}
+
+#[derive(Clone, Copy)]
+struct Arithmetic(Lanes, Lanes, Lanes);
+
+impl Operation for Arithmetic {
+    fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
+        let (a, b, c) = (simd.load(&self.0), simd.load(&self.1), simd.load(&self.2));
+        let results = [
+            a,
+            simd.splat(self.0[3]),
+            simd.add(a, b),
+            simd.sub(a, b),
+            simd.mul(a, b),
+            simd.div(a, b),
+            simd.max(a, b),
+            simd.min(a, b),
+            simd.mul_add(a, b, c),
+            simd.splat(simd.sum(a)),
+        ];
+        results.map(|lanes| simd.store(lanes)).to_vec()
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Whole(Lanes);
+
+impl Operation for Whole {
+    fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
+        vec![simd.store(simd.whole(simd.load(&self.0)))]
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Gather<'a> {
+    pairs: &'a [u16],
+    stride: usize,
+    x: Lanes,
+    y: Lanes,
+}
+
+impl Operation for Gather<'_> {
+    fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
+        let taps = simd.gather_bytes(self.pairs, self.stride, simd.load(&self.x), simd.load(&self.y));
+        taps.map(|tap| simd.store(tap)).to_vec()
+    }
+}
+
+#[derive(Clone, Copy)]
+struct LookUp<'a>(&'a [f32; 256], Lanes);
+
+impl Operation for LookUp<'_> {
+    fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
+        vec![simd.store(simd.look_up(self.0, simd.load(&self.1)))]
+    }
+}
+
+/// Any f32, with the special ones often.
+fn any_lane() -> impl Strategy<Value = f32> {
+    let special = [0.0, -0.0, 1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MIN_POSITIVE, f32::MAX];
+    prop_oneof![any::<f32>(), -300.0..300.0f32, prop::sample::select(special.to_vec())]
+}
+
+fn any_lanes() -> impl Strategy<Value = Lanes> {
+    prop::array::uniform8(any_lane())
+}
+
+fn whole_lanes(below: u32) -> impl Strategy<Value = Lanes> {
+    prop::array::uniform8((0..below).prop_map(|lane| lane as f32))
+}
+
+proptest! {
+    #[test]
+    fn arithmetic_gives_the_same_bits(a in any_lanes(), b in any_lanes(), c in any_lanes()) {
+        check(Arithmetic(a, b, c))?;
+    }
+
+    #[test]
+    fn whole_parts_give_the_same_bits(lanes in prop::array::uniform8(0.0..16_777_215.0f32)) {
+        check(Whole(lanes))?;
+        prop_assert_eq!(Whole(lanes).run(Scalar), vec![lanes.map(f32::trunc)]);
+    }
+
+    #[test]
+    fn gathered_bytes_are_those_of_two_pairs_also_beyond_the_end(
+        pairs in prop::collection::vec(any::<u16>(), 2..60),
+        stride in 1..20usize,
+        x in whole_lanes(30),
+        y in whole_lanes(30),
+    ) {
+        let gather = Gather { pairs: &pairs, stride, x, y };
+        check(gather)?;
+        let taps = gather.run(Scalar);
+        for lane in 0..LANES {
+            let index = (y[lane] as usize * stride + x[lane] as usize).min(pairs.len() - 2);
+            let [first, second] = [pairs[index], pairs[index + 1]].map(u16::to_le_bytes);
+            let expected = [first[0], first[1], second[0], second[1]].map(f32::from);
+            prop_assert_eq!([0, 1, 2, 3].map(|tap| taps[tap][lane]), expected);
+        }
+    }
+
+    #[test]
+    fn tables_are_read_at_their_entries(lanes in whole_lanes(256)) {
+        let table = std::array::from_fn(|entry| 1.0 / (1.0 + entry as f32));
+        check(LookUp(&table, lanes))?;
+        prop_assert_eq!(LookUp(&table, lanes).run(Scalar), vec![lanes.map(|lane| 1.0 / (1.0 + lane))]);
+    }
+}
+
+#[test]
+fn the_larger_and_smaller_of_what_is_not_a_number_is_the_second() {
+    let (nan, one) = ([f32::NAN; LANES], [1.0; LANES]);
+    for (a, b) in [(nan, one), (one, nan)] {
+        let results = Arithmetic(a, b, one).run(Scalar);
+        assert_eq!(bits(&results[6..8]), bits(&[b, b]));
+    }
+    // Zeros of either sign are equal: the second again.
+    let results = Arithmetic([0.0; LANES], [-0.0; LANES], one).run(Scalar);
+    assert_eq!(bits(&results[6..8]), bits(&[[-0.0; LANES]; 2]));
+}
+
+#[test]
+fn lanes_are_added_in_the_documented_tree() {
+    let l = [1e8, 3.0, -1e8, 0.1, 7.0, -2.5, 1.0, 1e-3];
+    let tree = ((l[0] + l[4]) + (l[2] + l[6])) + ((l[1] + l[5]) + (l[3] + l[7]));
+    let in_order = l.iter().fold(0.0f32, |sum, lane| sum + lane);
+    assert_ne!(tree, in_order, "the lanes must tell the orders apart");
+    assert_eq!(Scalar.sum(l), tree);
+}
+
+#[test]
+fn there_are_levels_and_the_last_is_the_best_of_the_machine() {
+    assert!(levels().take(2).eq([Level::Scalar, Level::Base]));
+    assert!(Level::detect().is_available());
+    // A machine whose AVX2 goes unused must not pass for tested.
+    #[cfg(target_arch = "x86_64")]
+    {
+        assert_eq!(Level::X86V3.is_available(), std::is_x86_feature_detected!("avx2"));
+        if std::env::var_os("SKEP_SIMD").is_none() {
+            let best = if std::is_x86_feature_detected!("avx2") { Level::X86V3 } else { Level::Base };
+            assert_eq!(Level::detect(), best);
+        }
+    }
+}
+
+#[test]
+fn a_level_the_machine_lacks_is_lowered() {
+    let (ran, _) = dispatch(Level::X86V3, Vectorized(Whole([0.0; LANES])));
+    assert_eq!(ran, levels().last().unwrap());
+}
