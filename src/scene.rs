@@ -49,7 +49,7 @@ pub struct Scene {
 
 impl Scene {
     /// Checks every view and point and settles each view's depth range: its own, else the 1st to 99th percentile of
-    /// the depths of the sparse points it saw, widened by a quarter on both sides.
+    /// the depths of the sparse points it saw, from three quarters of the one to twice the other.
     ///
     /// # Errors
     /// Fewer than two views; a name that occurs twice; a picture or mask of another size than its camera; a camera,
@@ -146,8 +146,9 @@ impl DepthRange {
 
 /// Percentiles of the depths of sparse points that bound a view's range: outliers of the triangulation lie beyond.
 const RANGE_PERCENTILES: (f64, f64) = (0.01, 0.99);
-/// Surfaces without features may lie before and behind all points by this share of the depth.
-const RANGE_MARGIN: f64 = 0.25;
+/// Surfaces without features may lie before and behind all points. The search is uniform in inverse depth, where twice
+/// the largest depth is not far.
+const RANGE_WIDENING: (f64, f64) = (0.75, 2.0);
 
 fn range_of_points(views: &[View], view: usize, points: &[SparsePoint]) -> Result<DepthRange> {
     let depth = |point: &SparsePoint| views[view].camera.to_camera(point.position).z;
@@ -167,7 +168,7 @@ fn range_of_points(views: &[View], view: usize, points: &[SparsePoint]) -> Resul
     depths.sort_by(f64::total_cmp);
     let percentile = |share: f64| depths[((depths.len() - 1) as f64 * share).round() as usize];
     Ok(DepthRange {
-        near: percentile(RANGE_PERCENTILES.0) * (1.0 - RANGE_MARGIN),
-        far: percentile(RANGE_PERCENTILES.1) * (1.0 + RANGE_MARGIN),
+        near: percentile(RANGE_PERCENTILES.0) * RANGE_WIDENING.0,
+        far: percentile(RANGE_PERCENTILES.1) * RANGE_WIDENING.1,
     })
 }
