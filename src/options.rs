@@ -88,7 +88,7 @@ pub struct Options {
     pub view_selection: bool,
     /// Triangulation angles of the start set, in degrees.
     pub triangulation_angle: (f64, f64),
-    /// At most this many source views a reference view, the best by angle and shared points; 0 takes all.
+    /// At most this many source views a reference view, those of the smallest triangulation angles; 0 takes all.
     pub max_sources: u32,
     /// Largest angle between normal and the ray to a source view, in degrees.
     pub max_incident_angle: f64,

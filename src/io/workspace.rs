@@ -156,7 +156,9 @@ impl Workspace {
                 let expected = "sparse/ with cameras.bin and images.bin, or cameras.txt and images.txt";
                 Error::file(
                     &folder,
-                    format!("no COLMAP model here or in the folder above; expected {expected}"),
+                    format!(
+                        "no COLMAP model here or in the folder above; expected {expected} (or say where with --scene SCENE)"
+                    ),
                 )
             }),
             None => Err(own),

@@ -8,7 +8,8 @@ use std::collections::HashMap;
 /// The source views of every view.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct SourceLists {
-    /// For each view the indices of its source views, smallest triangulation angle first.
+    /// For each view the indices of its source views: those in the band, smallest triangulation angle first, else
+    /// those nearest to it.
     pub lists: Vec<Vec<u32>>,
     /// Views for which the band had to be left, and views without any source, in sentences.
     pub warnings: Vec<String>,

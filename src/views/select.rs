@@ -24,7 +24,7 @@ pub fn is_occluded(depth: f32, validated_depth: f32, margin: f32) -> bool {
 pub struct ViewRules {
     min_cosine: f32,
     occlusion_margin: f32,
-    /// Sets smaller than this fall back to the start set inside the images; 0 never does.
+    /// Sets smaller than this fall back to the whole start set; 0 never does.
     min_views: usize,
     enabled: bool,
 }

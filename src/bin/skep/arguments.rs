@@ -65,6 +65,9 @@ enum Part {
 pub struct Fuse {
     /// Folder that holds stereo/depth_maps and stereo/normal_maps
     pub workspace: PathBuf,
+    /// Folder with images/ and sparse/ that the maps belong to [default: WORKSPACE itself or the folder above]
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
     /// Where the cloud goes [default: WORKSPACE/fused.ply]
     #[arg(short, long, value_name = "FILE.ply")]
     output: Option<PathBuf>,

@@ -5,7 +5,7 @@ use crate::interrupt::Interrupt;
 use crate::progress::Display;
 use crate::{Failure, streams};
 use skep::fusion::{FusionView, fuse, overlaps};
-use skep::io::{Workspace, WorkspaceMaps};
+use skep::io::{SceneFolder, Workspace, WorkspaceMaps};
 use skep::{Error, Options, PointCloud, Progress};
 
 /// Runs the command.
@@ -13,7 +13,11 @@ pub fn run(arguments: &Fuse) -> Result<(), Failure> {
     let display = Display::new(arguments.quiet);
     display.say(&format!("reading {}", arguments.workspace.display()));
     let workspace = Workspace::new(&arguments.workspace);
-    let maps = workspace.read(&workspace.find_scene()?)?;
+    let scene = match &arguments.scene {
+        Some(folder) => SceneFolder::find(folder)?,
+        None => workspace.find_scene()?,
+    };
+    let maps = workspace.read(&scene)?;
     if !maps.missing.is_empty() {
         let missing = maps.missing.join(", ");
         streams::warning(&format!(
