@@ -182,7 +182,7 @@ fn lists(cameras: &[Camera], points: &[(DVec3, &[u32])], options: &Options) -> S
 }
 
 fn ten_to_thirty() -> Options {
-    Options { triangulation_angle: (10.0, 30.0), max_sources: 0, ..Options::default() }
+    Options { triangulation_angle: (10.0, 30.0), max_sources: 0, min_consistent: 1, ..Options::default() }
 }
 
 /// Cameras around the origin, which is their middle depth too when they are 3 units away.
@@ -249,6 +249,19 @@ fn a_view_that_overlaps_with_no_other_is_told() {
     assert_eq!(found.lists, [vec![1], vec![0], vec![]]);
     let [warning] = &found.warnings[..] else { panic!("{:?}", found.warnings) };
     assert!(warning.contains("view2") && warning.contains("overlaps with no other view"), "{warning}");
+}
+
+#[test]
+fn a_view_with_too_few_sources_to_validate_anything_is_told() {
+    let options = Options { min_consistent: 2, ..ten_to_thirty() };
+    let found = lists(&around(&[0.0, 15.0]), &[], &options);
+    assert_eq!(found.lists, [vec![1], vec![0]]);
+    assert_eq!(found.warnings.len(), 2, "{:?}", found.warnings);
+    assert!(
+        found.warnings[0].contains("view0 has 1 source view(s), but 2 must agree"),
+        "{:?}",
+        found.warnings
+    );
 }
 
 #[test]
