@@ -5,6 +5,7 @@ mod common;
 use common::measure::{Share, normal_error, share_right};
 use common::procedural::{self, MIDDLE, Procedural, Shape, Surface, Texture, looking_at, pixel_centre};
 use glam::{DVec2, DVec3};
+use skep::simd::Level;
 use skep::{
     DepthRange, Error, Maps, Options, Outcome, Phase, Progress, Reconstruction, Scale, ViewResult,
     ignore_progress, reconstruct,
@@ -192,24 +193,38 @@ fn bits(values: &[f32]) -> Vec<u32> {
     values.iter().map(|value| value.to_bits()).collect()
 }
 
+fn assert_same_bits(one: &Reconstruction, other: &Reconstruction, what: &str) {
+    for (a, b) in one.views.iter().zip(&other.views) {
+        assert!(bits(&a.estimate.depth) == bits(&b.estimate.depth), "depths {what}");
+        let (normals, others) = (a.estimate.normal.as_flattened(), b.estimate.normal.as_flattened());
+        assert!(bits(normals) == bits(others), "normals {what}");
+        assert!(bits(&a.cost) == bits(&b.cost), "costs {what}");
+        assert!(a.outcome == b.outcome, "outcomes {what}");
+        assert!(a.sources == b.sources && a.view_sets == b.view_sets, "sets {what}");
+        assert_eq!(a.counts, b.counts);
+        assert_eq!(a.cycles, b.cycles);
+    }
+    assert!(one.points == other.points, "points {what}");
+    assert_eq!(one.warnings, other.warnings);
+}
+
 #[test]
 fn the_result_is_the_same_bits_for_any_number_of_threads() {
     let made = procedural::plane_and_sphere().only(&[1, 3, 4, 5]);
     let one = run(&made, &Options { threads: 1, ..options() });
     for threads in [2, 5] {
         let other = run(&made, &Options { threads, ..options() });
-        for (a, b) in one.views.iter().zip(&other.views) {
-            assert!(bits(&a.estimate.depth) == bits(&b.estimate.depth), "depths on {threads} threads");
-            let (normals, others) = (a.estimate.normal.as_flattened(), b.estimate.normal.as_flattened());
-            assert!(bits(normals) == bits(others), "normals on {threads} threads");
-            assert!(bits(&a.cost) == bits(&b.cost), "costs on {threads} threads");
-            assert!(a.outcome == b.outcome, "outcomes on {threads} threads");
-            assert!(a.sources == b.sources && a.view_sets == b.view_sets, "sets on {threads} threads");
-            assert_eq!(a.counts, b.counts);
-            assert_eq!(a.cycles, b.cycles);
-        }
-        assert!(one.points == other.points, "points on {threads} threads");
-        assert_eq!(one.warnings, other.warnings);
+        assert_same_bits(&one, &other, &format!("on {threads} threads"));
+    }
+}
+
+#[test]
+fn the_result_is_the_same_bits_on_every_instruction_set() {
+    let made = procedural::plane_and_sphere().only(&[3, 4, 5]);
+    let on = |level: Level| run(&made, &Options { simd: Some(level), ..options() });
+    let scalar = on(Level::Scalar);
+    for level in Level::ALL.into_iter().filter(|level| level.is_available()) {
+        assert_same_bits(&scalar, &on(level), &format!("on {}", level.name()));
     }
 }
 
