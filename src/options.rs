@@ -78,8 +78,9 @@ pub struct Options {
     /// From the second cycle on a pixel is matched only with this many views of its set, those in which its solution
     /// costs least; 0 takes the whole set.
     pub focused_views: u32,
-    /// Half the range of relative inverse depth in which the colonies of later cycles start around the pixel's solution,
-    /// halved with every cycle of a scale; 0 starts them at random (`paper`).
+    /// Half the range of relative inverse depth in which the colonies of later cycles start around a validated solution,
+    /// halved with every cycle of a scale; where nothing is validated one food source starts there and the rest at
+    /// random. 0 starts all at random (`paper`).
     pub restart_spread: f64,
     /// How far the normals of those colonies are tilted, as the half side of a cube added to the unit normal.
     pub restart_tilt: f64,

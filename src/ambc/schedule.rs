@@ -177,7 +177,7 @@ fn initialise<S: Simd>(
 }
 
 /// Without a solution: random planes, stratified in inverse depth. With one: it, what other views offer, and planes
-/// around it or random ones.
+/// around it; one that is not validated may be far off, so random planes take most of that place.
 #[inline(always)]
 fn fill_colony<S: Simd>(
     search: &Search,
