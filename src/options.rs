@@ -190,6 +190,9 @@ impl Options {
         if let Aggregation::BestViews(views) = self.aggregation {
             check_whole("aggregation.best_views", views, 1, 8)?;
         }
+        if self.focused_views > 0 {
+            check_whole("focused_views", self.focused_views, 2, u32::MAX)?;
+        }
         check_number("stop_share", self.stop_share, 0.0, 1.0)?;
         check_number("spatial_sigma", self.spatial_sigma, 1e-3, 1e6)?;
         check_number("colour_sigma", self.colour_sigma, 1e-3, 1e6)?;

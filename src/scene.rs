@@ -133,13 +133,15 @@ fn check_view(view: &View, name: &str) -> Result<()> {
 impl DepthRange {
     /// Refuses a range that holds no depth; `name` is how the error calls it.
     pub fn check(&self, name: &str) -> Result<()> {
-        if self.near > 0.0 && self.near < self.far && self.far.is_finite() {
+        // Beyond these depths or their inverses leave the f32 of the solver.
+        let representable = 1e-30..=1e30;
+        if self.near < self.far && representable.contains(&self.near) && representable.contains(&self.far) {
             return Ok(());
         }
         Err(Error::argument(
             name,
             format!("{} to {}", self.near, self.far),
-            "finite depths with 0 < near < far",
+            "finite depths of 1e-30 to 1e30 with 0 < near < far",
         ))
     }
 }
@@ -167,8 +169,26 @@ fn range_of_points(views: &[View], view: usize, points: &[SparsePoint]) -> Resul
     }
     depths.sort_by(f64::total_cmp);
     let percentile = |share: f64| depths[((depths.len() - 1) as f64 * share).round() as usize];
-    Ok(DepthRange {
+    let range = DepthRange {
         near: percentile(RANGE_PERCENTILES.0) * RANGE_WIDENING.0,
         far: percentile(RANGE_PERCENTILES.1) * RANGE_WIDENING.1,
-    })
+    };
+    range.check(&format!("depth range of {} from its sparse points", views[view].name)).map(|()| range)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_depth_range_the_solver_cannot_hold_is_refused() {
+        let check = |near, far| DepthRange { near, far }.check("range");
+        assert_eq!(check(0.5, 12.0), Ok(()));
+        for (near, far) in [(2.0, 1.0), (1.0, 1.0), (0.0, 1.0), (-1.0, 1.0), (1e-60, 1.0), (1.0, 1e60)] {
+            assert!(check(near, far).is_err(), "{near} to {far}");
+        }
+        for (near, far) in [(f64::NAN, 1.0), (1.0, f64::NAN), (1.0, f64::INFINITY)] {
+            assert!(check(near, far).is_err(), "{near} to {far}");
+        }
+    }
 }

@@ -31,6 +31,7 @@ fn an_option_out_of_range_is_named_with_its_value() {
         (|o| o.min_consistent = 0, "min_consistent", "0"),
         (|o| o.aggregation = Aggregation::BestViews(0), "aggregation.best_views", "0"),
         (|o| o.aggregation = Aggregation::BestViews(9), "aggregation.best_views", "9"),
+        (|o| o.focused_views = 1, "focused_views", "1"),
         (|o| o.stop_share = 1.5, "stop_share", "1.5"),
         (|o| o.spatial_sigma = 0.0, "spatial_sigma", "0"),
         (|o| o.colour_sigma = -1.0, "colour_sigma", "-1"),

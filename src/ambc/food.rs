@@ -75,7 +75,7 @@ impl FoodSource {
         let inverse_depth = self.plane(reference, from).inverse_depth_at(offset.0, offset.1);
         let depth = 1.0 / inverse_depth;
         let valid = depth >= reference.near && depth <= reference.far && self.normal.dot(to) < -MIN_FACING;
-        valid.then_some(FoodSource { depth, ..FoodSource::new(depth, self.normal) })
+        valid.then(|| FoodSource::new(depth, self.normal))
     }
 }
 

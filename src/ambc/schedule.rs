@@ -279,7 +279,7 @@ pub struct Assessment {
     pub textured: Vec<bool>,
     /// The view set of each solution.
     pub sets: ViewSets,
-    /// Number of views in which the solution was matched, before any falling back to the start set.
+    /// Work done.
     pub counts: Counts,
 }
 

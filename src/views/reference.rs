@@ -101,7 +101,7 @@ pub struct ValidatedDepth {
     pub exact: f32,
 }
 
-/// A projected point: column, row and depth in the source view.
+/// Where a point falls in the source view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Projection {
     /// Column in pixels.
