@@ -63,11 +63,11 @@ impl ConsistencyRules {
 }
 
 /// Checks every solution of a reference view against the sources of its view set; `sources` are their states in the
-/// order of the reference's list. Gives the number of consistent sources and whether the solution is validated.
+/// order of the reference's list, `None` of one that cannot speak. Gives the number of consistent sources and whether the solution is validated.
 pub fn check(
     reference: &Reference,
     state: &ViewState,
-    sources: &[&ViewState],
+    sources: &[Option<&ViewState>],
     rules: &ConsistencyRules,
 ) -> Vec<(u8, bool)> {
     let width = reference.image.width;
@@ -79,7 +79,8 @@ pub fn check(
         let (mut consistent, mut speaking) = (0, 0);
         for index in state.sets.iter(pixel) {
             let source = &reference.sources[index];
-            match verdict(source, sources[index], (x, y), solution, rules) {
+            let Some(state) = sources[index] else { continue };
+            match verdict(source, state, (x, y), solution, rules) {
                 Verdict::Consistent => (consistent, speaking) = (consistent + 1, speaking + 1),
                 Verdict::Inconsistent => speaking += 1,
                 Verdict::Abstains => {}
@@ -178,7 +179,7 @@ mod tests {
         for (state, factor) in states[1..].iter_mut().zip(factors) {
             state.solutions.iter_mut().for_each(|solution| solution.depth *= factor);
         }
-        let sources: Vec<&ViewState> = states[1..].iter().collect();
+        let sources: Vec<Option<&ViewState>> = states[1..].iter().map(Some).collect();
         let rules = ConsistencyRules::new(&abstaining(occluders_abstain));
         let verdicts = check(&world.reference(), &states[0], &sources, &rules);
         assert_eq!(verdicts.len(), states[0].solutions.len());
@@ -210,7 +211,7 @@ mod tests {
         let rules = ConsistencyRules::new(&abstaining(true));
         let mut verdicts = |sets: ViewSets| {
             states[0].sets = sets;
-            let sources: Vec<&ViewState> = states[1..].iter().collect();
+            let sources: Vec<Option<&ViewState>> = states[1..].iter().map(Some).collect();
             check(&world.reference(), &states[0], &sources, &rules)
         };
         let middle = 14 * 36 + 18;
@@ -227,7 +228,7 @@ mod tests {
         let world = World::five();
         let mut states = world.exact();
         states[0].solutions[14 * 36 + 18].depth = 0.0;
-        let sources: Vec<&ViewState> = states[1..].iter().collect();
+        let sources: Vec<Option<&ViewState>> = states[1..].iter().map(Some).collect();
         let rules = ConsistencyRules::new(&abstaining(true));
         assert_eq!(check(&world.reference(), &states[0], &sources, &rules)[14 * 36 + 18], (0, false));
     }

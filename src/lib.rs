@@ -15,6 +15,7 @@ pub mod kernels;
 mod maps;
 mod options;
 mod outcome;
+mod pool;
 mod progress;
 mod propagation;
 mod scene;
@@ -30,7 +31,7 @@ pub use maps::{Counts, CycleRecord, Maps, Outcome, PointCloud, PointViews, Recon
 pub use options::{Aggregation, FusionOptions, Options, Scale};
 pub use progress::{Hook, Phase, Progress, ignore_progress};
 pub use scene::{DepthRange, Scene, SparsePoint, View};
-pub use solve::reconstruct;
+pub use solve::{Offers, OwnMaps, State, Step, Steps, Verdicts, reconstruct};
 
 /// Compiles the example of the README.
 #[cfg(doctest)]

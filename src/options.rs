@@ -1,7 +1,10 @@
 //! Every number the method depends on, and the two presets.
 
+mod table;
+
 use crate::error::{Error, Result};
 use crate::simd::Level;
+use table::{Kind, TABLE};
 
 /// The search on one scale of the pyramid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,8 +44,8 @@ pub struct FusionOptions {
 impl FusionOptions {
     /// Refuses values no fusion can be made with, naming the option.
     pub fn check(&self) -> Result<()> {
-        check_number("fusion.depth_tolerance", self.depth_tolerance, 0.0, 1.0)?;
-        check_number("fusion.normal_tolerance", self.normal_tolerance, 0.0, 180.0)
+        Kind::Number(0.0, 1.0).check("fusion.depth_tolerance", self.depth_tolerance)?;
+        Kind::Number(0.0, 180.0).check("fusion.normal_tolerance", self.normal_tolerance)
     }
 }
 
@@ -184,38 +187,22 @@ impl Options {
     /// Refuses values no run can be made with, naming the option.
     pub fn check(&self) -> Result<()> {
         self.check_scales()?;
-        check_whole("window_radius", self.window_radius, 1, 16)?;
-        check_whole("window_step", self.window_step, 1, 8)?;
-        check_whole("min_consistent", self.min_consistent, 1, u32::MAX)?;
-        if let Aggregation::BestViews(views) = self.aggregation {
-            check_whole("aggregation.best_views", views, 1, 8)?;
+        for entry in TABLE {
+            entry.kind.check(entry.name, (entry.get)(self))?;
         }
-        if self.focused_views > 0 {
-            check_whole("focused_views", self.focused_views, 2, u32::MAX)?;
+        let (min, max) = self.triangulation_angle;
+        Kind::Number(min, 180.0).check("triangulation_angle.max", max)?;
+        if self.aggregation == Aggregation::BestViews(0) {
+            Kind::Whole(1, 8).check("best_views", 0.0)?;
         }
-        check_number("stop_share", self.stop_share, 0.0, 1.0)?;
-        check_number("spatial_sigma", self.spatial_sigma, 1e-3, 1e6)?;
-        check_number("colour_sigma", self.colour_sigma, 1e-3, 1e6)?;
-        check_number("min_variance", self.min_variance, 0.0, 1.0)?;
-        check_number("restart_spread", self.restart_spread, 0.0, 0.5)?;
-        check_number("restart_tilt", self.restart_tilt, 0.0, 10.0)?;
-        check_number("triangulation_angle.min", self.triangulation_angle.0, 0.0, 180.0)?;
-        check_number(
-            "triangulation_angle.max",
-            self.triangulation_angle.1,
-            self.triangulation_angle.0,
-            180.0,
-        )?;
-        check_number("max_incident_angle", self.max_incident_angle, 0.0, 90.0)?;
-        check_number("occlusion_margin", self.occlusion_margin, 0.0, 1.0)?;
-        check_number("reward", self.reward, 0.0, 1.0)?;
-        check_number("geometric_weight", self.geometric_weight, 0.0, 1e3)?;
-        check_number("geometric_limit", self.geometric_limit, 0.0, 1e3)?;
-        check_number("geometric_unknown", self.geometric_unknown, 0.0, 1e3)?;
-        check_number("depth_tolerance", self.depth_tolerance, 0.0, 1.0)?;
-        check_number("normal_tolerance", self.normal_tolerance, 0.0, 180.0)?;
-        check_number("consistent_share", self.consistent_share, 0.0, 1.0)?;
-        self.fusion.check()
+        if self.focused_views == 1 {
+            return Err(Error::argument(
+                "options.focused_views",
+                1,
+                "0 for all views of the set, or at least 2",
+            ));
+        }
+        Ok(())
     }
 
     fn check_scales(&self) -> Result<()> {
@@ -229,11 +216,15 @@ impl Options {
             ));
         }
         for scale in &self.scales {
-            check_whole("scales.halvings", scale.halvings, 0, 8)?;
-            check_whole("scales.foods", scale.foods, 2, 64)?;
-            check_whole("scales.first_iterations", scale.first_iterations, 0, 10_000)?;
-            check_whole("scales.cycles", scale.cycles, 0, 1_000)?;
-            check_whole("scales.cycle_iterations", scale.cycle_iterations, 0, 10_000)?;
+            for (name, value, min, max) in [
+                ("scales.halvings", scale.halvings, 0, 8),
+                ("scales.foods", scale.foods, 2, 64),
+                ("scales.first_iterations", scale.first_iterations, 0, 10_000),
+                ("scales.cycles", scale.cycles, 0, 1_000),
+                ("scales.cycle_iterations", scale.cycle_iterations, 0, 10_000),
+            ] {
+                Kind::Whole(min, max).check(name, f64::from(value))?;
+            }
         }
         Ok(())
     }
@@ -251,46 +242,13 @@ impl Options {
             )
         };
         let simd = self.simd.map_or("best".to_owned(), |level| level.name().to_owned());
-        let aggregation = match self.aggregation {
-            Aggregation::AllViews => "sum over S / (|S| - 1)".to_owned(),
-            Aggregation::BestViews(views) => format!("mean of the best {views}"),
-        };
-        let angles = self.triangulation_angle;
-        vec![
+        let mut entries = vec![
             ("seed", self.seed.to_string()),
-            ("threads", self.threads.to_string()),
             ("simd", simd),
             ("scales", self.scales.iter().map(scale).collect::<Vec<_>>().join("; ")),
-            ("trial_limit", self.trial_limit.to_string()),
-            ("stop_share", self.stop_share.to_string()),
-            ("window_radius", self.window_radius.to_string()),
-            ("window_step", self.window_step.to_string()),
-            ("spatial_sigma", self.spatial_sigma.to_string()),
-            ("colour_sigma", self.colour_sigma.to_string()),
-            ("min_variance", self.min_variance.to_string()),
-            ("aggregation", aggregation),
-            ("focused_views", self.focused_views.to_string()),
-            ("restart_spread", self.restart_spread.to_string()),
-            ("restart_tilt", self.restart_tilt.to_string()),
-            ("view_selection", self.view_selection.to_string()),
-            ("triangulation_angle", format!("{} to {}", angles.0, angles.1)),
-            ("max_sources", self.max_sources.to_string()),
-            ("max_incident_angle", self.max_incident_angle.to_string()),
-            ("occlusion_margin", self.occlusion_margin.to_string()),
-            ("reward", self.reward.to_string()),
-            ("propagation", self.propagation.to_string()),
-            ("geometric_weight", self.geometric_weight.to_string()),
-            ("geometric_limit", self.geometric_limit.to_string()),
-            ("geometric_unknown", self.geometric_unknown.to_string()),
-            ("depth_tolerance", self.depth_tolerance.to_string()),
-            ("normal_tolerance", self.normal_tolerance.to_string()),
-            ("min_consistent", self.min_consistent.to_string()),
-            ("consistent_share", self.consistent_share.to_string()),
-            ("occluders_abstain", self.occluders_abstain.to_string()),
-            ("fusion.depth_tolerance", self.fusion.depth_tolerance.to_string()),
-            ("fusion.normal_tolerance", self.fusion.normal_tolerance.to_string()),
-            ("fusion.min_views", self.fusion.min_views.to_string()),
-        ]
+        ];
+        entries.extend(TABLE.iter().map(|entry| (entry.name, (entry.get)(self).to_string())));
+        entries
     }
 }
 
@@ -318,18 +276,4 @@ impl Default for Options {
             ..Options::paper()
         }
     }
-}
-
-fn check_whole(name: &str, value: u32, min: u32, max: u32) -> Result<()> {
-    if (min..=max).contains(&value) {
-        return Ok(());
-    }
-    Err(Error::argument(format!("options.{name}"), value, format!("a whole number from {min} to {max}")))
-}
-
-fn check_number(name: &str, value: f64, min: f64, max: f64) -> Result<()> {
-    if (min..=max).contains(&value) {
-        return Ok(());
-    }
-    Err(Error::argument(format!("options.{name}"), value, format!("a number from {min} to {max}")))
 }

@@ -28,6 +28,9 @@ pub struct View {
     pub mask: Option<Vec<bool>>,
     /// Where to look for surfaces; `None` takes it from the sparse points.
     pub depth_range: Option<DepthRange>,
+    /// The views to match it with, as indices into the scene's views, those that matter most first; `None` chooses them
+    /// by their triangulation angle.
+    pub sources: Option<Vec<u32>>,
 }
 
 /// A point triangulated by structure from motion.
@@ -53,15 +56,17 @@ impl Scene {
     ///
     /// # Errors
     /// Fewer than two views; a name that occurs twice; a picture or mask of another size than its camera; a camera,
-    /// range or point that is not finite or makes no sense; a point that names a view there is not; a view with
-    /// neither range nor sparse points.
+    /// range or point that is not finite or makes no sense; a point or source list that names a view there is not, or a
+    /// source list that names the view itself or a view twice; a view with neither range nor sparse points.
     pub fn new(views: Vec<View>, points: Vec<SparsePoint>) -> Result<Scene> {
         if views.len() < 2 {
             return Err(Error::argument("views", views.len(), "at least 2 views: depth needs another view"));
         }
         check_names(&views)?;
         for (index, view) in views.iter().enumerate() {
-            check_view(view, &format!("views[{index}] ({})", view.name))?;
+            let name = format!("views[{index}] ({})", view.name);
+            check_view(view, &name)?;
+            check_sources(&name, index, view.sources.as_deref().unwrap_or_default(), views.len())?;
         }
         for (index, point) in points.iter().enumerate() {
             if !point.position.is_finite() {
@@ -83,6 +88,11 @@ impl Scene {
             })
             .collect::<Result<_>>()?;
         Ok(Scene { views, points, depth_ranges })
+    }
+
+    /// The views and points again, to change them.
+    pub fn into_parts(self) -> (Vec<View>, Vec<SparsePoint>) {
+        (self.views, self.points)
     }
 
     /// The views in the order they were handed in.
@@ -128,6 +138,17 @@ fn check_view(view: &View, name: &str) -> Result<()> {
         Some(range) => range.check(&format!("{name}.depth_range")),
         None => Ok(()),
     }
+}
+
+fn check_sources(name: &str, view: usize, sources: &[u32], views: usize) -> Result<()> {
+    for (place, &source) in sources.iter().enumerate() {
+        let known = (source as usize) < views && source as usize != view;
+        if !known || sources[..place].contains(&source) {
+            let expected = format!("other views below {views}, each once");
+            return Err(Error::argument(format!("{name}.sources[{place}]"), source, expected));
+        }
+    }
+    Ok(())
 }
 
 impl DepthRange {

@@ -48,13 +48,16 @@ impl ViewState {
         self.solutions.iter().filter(|solution| solution.validated).count() as u64
     }
 
-    /// The state handed up to the next finer scale: each fine pixel gets the plane of its coarse pixel.
+    /// The state handed up to the next finer scale: each fine pixel gets the plane, cost and view set of its coarse pixel.
     pub fn refined(&self, coarse: &Camera, fine: &Camera, range: DepthRange) -> ViewState {
         let (width, coarse_width) = (fine.width as usize, coarse.width as usize);
+        let parent = |pixel: usize| {
+            let (x, y) = (pixel % width, pixel / width);
+            (y / 2).min(coarse.height as usize - 1) * coarse_width + (x / 2).min(coarse_width - 1)
+        };
         let refine = |pixel: usize| {
             let (x, y) = (pixel % width, pixel / width);
-            let source =
-                (y / 2).min(coarse.height as usize - 1) * coarse_width + (x / 2).min(coarse_width - 1);
+            let source = parent(pixel);
             let solution = self.solutions[source];
             if solution.depth <= 0.0 {
                 return solution;
@@ -68,7 +71,9 @@ impl ViewState {
         };
         let solutions: Vec<Solution> = (0..fine.pixels()).into_par_iter().map(refine).collect();
         let surface = surface(fine, &solutions);
-        ViewState { solutions, surface, ..ViewState::default() }
+        let cost = (0..fine.pixels()).map(|pixel| self.cost[parent(pixel)]).collect();
+        let sets = self.sets.of((0..fine.pixels()).map(parent));
+        ViewState { solutions, cost, sets, surface }
     }
 }
 

@@ -89,6 +89,7 @@ fn scene(wanted: usize) -> Scene {
         camera,
         mask: Some((0..15).map(|pixel| pixel == wanted).collect()),
         depth_range: Some(DepthRange { near: 1.0, far: 2.0 }),
+        sources: None,
     };
     Scene::new(vec![view("a"), view("b")], Vec::new()).unwrap()
 }

@@ -176,6 +176,7 @@ fn lists(cameras: &[Camera], points: &[(DVec3, &[u32])], options: &Options) -> S
         camera: *camera,
         mask: None,
         depth_range: Some(RANGE),
+        sources: None,
     });
     let points = points.iter().map(|&(position, views)| SparsePoint { position, views: views.to_vec() });
     source_lists(&Scene::new(views.collect(), points.collect()).unwrap(), options)

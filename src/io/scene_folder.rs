@@ -69,7 +69,7 @@ pub fn read_scene(folder: &Path, depth_range: Option<DepthRange>) -> Result<Scen
     let model = ColmapModel::read(&scene.sparse)?;
     let view = |image: super::ModelImage| {
         let picture = scene.read_picture(&image.name, &image.camera)?;
-        Ok(View { name: image.name, picture, camera: image.camera, mask: None, depth_range })
+        Ok(View { name: image.name, picture, camera: image.camera, mask: None, depth_range, sources: None })
     };
     let views = model.images.into_iter().map(view).collect::<Result<_>>()?;
     Scene::new(views, model.points)

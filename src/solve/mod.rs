@@ -1,22 +1,25 @@
 //! The cycles (section 3 of the paper): search every view, check the views against each other, let what was validated
 //! guide the next search; from the coarsest scale to full size; then fuse.
 
-mod results;
+mod bytes;
+mod prepare;
+mod result;
 mod schedule;
-mod view;
+mod search;
+mod state;
 
-use crate::consistency::{self, ConsistencyRules};
 use crate::error::{Error, Result};
-use crate::image::ScaledView;
-use crate::kernels::Window;
-use crate::maps::{Counts, CycleRecord, Reconstruction};
+use crate::fusion::{self, FusionView};
+use crate::maps::{Maps, PointCloud, Reconstruction, ViewResult};
 use crate::options::Options;
-use crate::progress::{Hook, Phase, Tracker};
+use crate::pool::JoinedPool;
+use crate::progress::{Hook, Phase, Progress, Tracker};
 use crate::scene::Scene;
-use crate::simd::Level;
-use crate::state::{Solution, ViewState};
-use crate::views::{SourceLists, source_lists};
-use schedule::Step;
+pub use prepare::Steps;
+pub use schedule::Step;
+pub use search::{Offers, Verdicts};
+pub use state::{OwnMaps, State};
+use std::ops::ControlFlow;
 
 /// Estimates depth, normal and view set of every pixel of every view, and fuses the validated ones.
 ///
@@ -27,146 +30,88 @@ use schedule::Step;
 /// An option out of its range, named; [`Error::Cancelled`] when the hook breaks.
 pub fn reconstruct(scene: &Scene, options: &Options, hook: Hook) -> Result<Reconstruction> {
     options.check()?;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads);
-    let run = |pool: &rayon::ThreadPool| pool.install(|| Run::new(scene, options, hook).run());
-    pool.build_scoped(|thread| thread.run(), run).map_err(|error| {
-        let expected = format!("a number of threads that the system can start ({error})");
-        Error::argument("options.threads", options.threads, expected)
-    })?
+    JoinedPool::new(options.threads)?.install(|| run(scene, options, hook))
 }
 
-/// What stays the same during a run, and what it keeps a record of.
-struct Run<'a> {
-    scene: &'a Scene,
-    options: &'a Options,
-    hook: Hook<'a>,
-    level: Level,
-    window: Window,
-    sources: SourceLists,
-    cycles: Vec<Vec<CycleRecord>>,
-    counts: Vec<Counts>,
+/// Share of the whole work that fusion is reckoned at.
+const FUSION_SHARE: f64 = 0.03;
+
+fn run(scene: &Scene, options: &Options, hook: Hook) -> Result<Reconstruction> {
+    let steps = Steps::new(scene, options)?;
+    let work_before = |step| steps.all()[..step].iter().map(|step| step.work(scene)).sum::<u64>();
+    let total = work_before(steps.all().len());
+    let tracker = Tracker::new(hook, (total as f64 / (1.0 - FUSION_SHARE)) as u64);
+    let mut states: Vec<State> = Vec::new();
+    let mut next = Some(0);
+    while let Some(step) = next {
+        states = cycle(&steps, step, states, &tracker)?;
+        next = steps.next(step, &some(&states))?;
+        tracker.jump_to(work_before(next.unwrap_or(steps.all().len())));
+    }
+    let views = finish(&steps, &states, &tracker)?;
+    let points = fuse(scene, options, &views, hook)?;
+    Ok(Reconstruction { views, points, warnings: steps.warnings().to_vec() })
 }
 
-impl<'a> Run<'a> {
-    fn new(scene: &'a Scene, options: &'a Options, hook: Hook<'a>) -> Run<'a> {
-        let window = Window::new(
-            options.window_radius,
-            options.window_step,
-            options.spatial_sigma,
-            options.colour_sigma,
-            options.min_variance,
-        );
-        Run {
-            scene,
-            options,
-            hook,
-            level: options.simd.unwrap_or_else(Level::detect),
-            window,
-            sources: source_lists(scene, options),
-            cycles: vec![Vec::new(); scene.views().len()],
-            counts: vec![Counts::default(); scene.views().len()],
+/// One cycle: every view is searched from the states the last cycle left, then all are checked.
+fn cycle(steps: &Steps, step: usize, states: Vec<State>, tracker: &Tracker) -> Result<Vec<State>> {
+    let views = steps.views();
+    let mut states = states;
+    for (view, state) in states.iter_mut().enumerate() {
+        if steps.is_coarser(state, step) {
+            *state = steps.hand_up(step, view, state)?;
         }
     }
-
-    fn run(mut self) -> Result<Reconstruction> {
-        let steps = Step::all(self.options);
-        let total: u64 = steps.iter().map(|step| step.work(self.scene)).sum();
-        let tracker = Tracker::new(self.hook, (total as f64 / (1.0 - results::FUSION_SHARE)) as u64);
-        let mut finished = 0;
-        let mut views = Vec::new();
-        let mut states = Vec::new();
-        let mut settled_scale = None;
-        for step in steps {
-            if step.cycle == 0 {
-                let finer = ScaledView::all(self.scene, step.scale.halvings);
-                states = hand_up(&states, &views, &finer);
-                views = finer;
-            }
-            if settled_scale != Some(step.scale_index) {
-                let changed = self.cycle(step, &views, &mut states, &tracker)?;
-                if step.cycle > 0 && changed < self.options.stop_share {
-                    settled_scale = Some(step.scale_index);
-                }
-            }
-            finished += step.work(self.scene);
-            tracker.jump_to(finished);
-        }
-        self.finish(&views, &states, &tracker)
+    let before = some(&states);
+    let mut searched = Vec::with_capacity(views);
+    for view in 0..views {
+        let offers = steps.propagate(step, view, &before)?;
+        let progress = steps.all()[step].progress(Phase::Search, view, views);
+        let advance = |units| tracker.advance(units, progress);
+        searched.push(steps.search_with(step, view, &before, Some(&offers), &advance)?);
     }
-
-    /// One cycle: every view is searched from the states the last cycle left, then all are checked. Gives the share of
-    /// pixels that changed.
-    fn cycle(
-        &mut self,
-        step: Step,
-        views: &[ScaledView],
-        states: &mut Vec<ViewState>,
-        tracker: &Tracker,
-    ) -> Result<f64> {
-        let mut searched = Vec::with_capacity(views.len());
-        for view in 0..views.len() {
-            searched.push(self.search(step, view, views, states, tracker)?);
+    let mut verdicts = Vec::with_capacity(views);
+    for view in 0..views {
+        verdicts.push(steps.check(step, view, &some(&searched))?);
+        if tracker.advance(0, steps.all()[step].progress(Phase::Check, view, views)) {
+            return Err(Error::Cancelled);
         }
-        let verdicts = self.check(step, views, &searched, tracker)?;
-        let (mut changed, mut pixels) = (0, 0);
-        for (view, (state, verdicts)) in searched.iter_mut().zip(&verdicts).enumerate() {
-            state.mark(&views[view].camera, verdicts);
-            let record = CycleRecord {
-                reduction: step.reduction(),
-                cycle: step.cycle,
-                pixels: state.solutions.iter().filter(|solution| solution.depth > 0.0).count() as u64,
-                changed: count_changed(&states[view].solutions, &state.solutions),
-                validated: state.validated(),
-            };
-            changed += record.changed;
-            pixels += record.pixels;
-            self.cycles[view].push(record);
-        }
-        *states = searched;
-        Ok(changed as f64 / pixels.max(1) as f64)
     }
-
-    /// The geometric consistency check of every view against the solutions all have just found.
-    fn check(
-        &self,
-        step: Step,
-        views: &[ScaledView],
-        searched: &[ViewState],
-        tracker: &Tracker,
-    ) -> Result<Vec<Vec<(u8, bool)>>> {
-        let rules = ConsistencyRules::new(self.options);
-        let mut verdicts = Vec::with_capacity(views.len());
-        for view in 0..views.len() {
-            let reference = self.reference(view, views, searched);
-            let list = &self.sources.lists[view];
-            let sources: Vec<&ViewState> = list.iter().map(|&source| &searched[source as usize]).collect();
-            verdicts.push(consistency::check(&reference, &searched[view], &sources, &rules));
-            if tracker.advance(0, step.progress(Phase::Check, view, views.len())) {
-                return Err(Error::Cancelled);
-            }
-        }
-        Ok(verdicts)
+    for ((view, state), verdicts) in searched.iter_mut().enumerate().zip(&verdicts) {
+        steps.mark(view, state, verdicts)?;
     }
+    Ok(searched)
 }
 
-/// The states to start a scale from: none at first, then those of the next coarser scale.
-fn hand_up(states: &[ViewState], coarse: &[ScaledView], fine: &[ScaledView]) -> Vec<ViewState> {
-    if states.is_empty() {
-        return vec![ViewState::default(); fine.len()];
-    }
-    let refined = |(view, state): (usize, &ViewState)| {
-        state.refined(&coarse[view].camera, &fine[view].camera, fine[view].range)
+/// The states of all views as the steps take them.
+fn some(states: &[State]) -> Vec<Option<&State>> {
+    states.iter().map(Some).collect()
+}
+
+/// Settles what became of every pixel.
+fn finish(steps: &Steps, states: &[State], tracker: &Tracker) -> Result<Vec<ViewResult>> {
+    let views = steps.views();
+    let last = steps.all().last().expect("options have a scale");
+    let finish_one = |view| {
+        let progress = last.progress(Phase::Check, view, views);
+        steps.finish_with(view, &some(states), &|units| tracker.advance(units, progress))
     };
-    states.iter().enumerate().map(refined).collect()
+    (0..views).map(finish_one).collect()
 }
 
-/// A solution changed when its depth moved by more than this share.
-const CHANGE: f32 = 1e-3;
-
-fn count_changed(before: &[Solution], after: &[Solution]) -> u64 {
-    let changed = |(pixel, solution): &(usize, &Solution)| {
-        let before = before.get(*pixel).map_or(0.0, |solution| solution.depth);
-        solution.depth > 0.0 && (solution.depth - before).abs() > CHANGE * solution.depth
+fn fuse(scene: &Scene, options: &Options, results: &[ViewResult], hook: Hook) -> Result<PointCloud> {
+    let maps: Vec<Maps> = results.iter().map(ViewResult::filtered).collect();
+    let overlaps = fusion::overlaps(results.len(), scene.points());
+    let views: Vec<FusionView> = (scene.views().iter().zip(&maps).zip(&overlaps))
+        .map(|((view, maps), overlap)| FusionView {
+            camera: &view.camera,
+            maps,
+            picture: Some(&view.picture),
+            overlap,
+        })
+        .collect();
+    let hook = |at: &Progress| -> ControlFlow<()> {
+        hook(&Progress { done: 1.0 - FUSION_SHARE * (1.0 - at.done), ..*at })
     };
-    after.iter().enumerate().filter(changed).count() as u64
+    fusion::fuse(&views, &options.fusion, &hook)
 }

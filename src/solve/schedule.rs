@@ -1,11 +1,11 @@
-//! The order of the searches of a run.
+//! The order of the cycles of a run.
 
 use crate::options::{Options, Scale};
 use crate::progress::{Phase, Progress};
 use crate::scene::Scene;
 
-/// One cycle on one scale.
-#[derive(Debug, Clone, Copy)]
+/// One cycle on one scale: every view is searched, then all views are checked against each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Step {
     /// Place of the scale among the options' scales.
     pub scale_index: usize,
@@ -17,7 +17,7 @@ pub struct Step {
 
 impl Step {
     /// All steps of a run in order.
-    pub fn all(options: &Options) -> Vec<Step> {
+    pub(super) fn all(options: &Options) -> Vec<Step> {
         let scales = options.scales.iter().enumerate();
         let cycles = |(scale_index, &scale): (usize, &Scale)| {
             (0..=scale.cycles).map(move |cycle| Step { scale_index, scale, cycle })
@@ -35,15 +35,20 @@ impl Step {
         1 << self.scale.halvings
     }
 
-    /// Units of work of searching all views: a pass over a pixel counts its food sources.
-    pub fn work(&self, scene: &Scene) -> u64 {
+    /// Units of work of searching all views.
+    pub(super) fn work(&self, scene: &Scene) -> u64 {
         let pixels: u64 = scene.views().iter().map(|view| view.camera.pixels() as u64).sum();
+        self.work_on(pixels >> (2 * self.scale.halvings))
+    }
+
+    /// Units of work of searching this many pixels: a pass over a pixel counts its food sources.
+    pub(super) fn work_on(&self, pixels: u64) -> u64 {
         let passes = 1 + 2 * u64::from(self.iterations());
-        (pixels >> (2 * self.scale.halvings)) * passes * u64::from(self.scale.foods)
+        pixels * passes * u64::from(self.scale.foods)
     }
 
     /// Where the run stands when it does this to a view.
-    pub fn progress(&self, phase: Phase, view: usize, views: usize) -> Progress {
+    pub(super) fn progress(&self, phase: Phase, view: usize, views: usize) -> Progress {
         Progress { phase, reduction: self.reduction(), cycle: self.cycle, view, views, done: 0.0 }
     }
 }

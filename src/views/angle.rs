@@ -1,7 +1,7 @@
 //! The start set: views whose triangulation angle with the reference view lies in a band.
 
 use crate::options::Options;
-use crate::scene::Scene;
+use crate::scene::{Scene, View};
 use glam::{DVec2, DVec3};
 use std::collections::HashMap;
 
@@ -14,6 +14,9 @@ pub struct SourceLists {
     /// Views for which the band had to be left, and views without any source, in sentences.
     pub warnings: Vec<String>,
 }
+
+/// Angles by pair of views, the lower index first.
+type SharedAngles = HashMap<(usize, usize), Vec<f64>>;
 
 /// Fewer shared points than this say little: a false match has any angle.
 const MIN_SHARED_POINTS: usize = 3;
@@ -28,16 +31,13 @@ pub fn source_lists(scene: &Scene, options: &Options) -> SourceLists {
     let shared = shared_angles(scene);
     let mut found = SourceLists::default();
     for (index, view) in scene.views().iter().enumerate() {
+        if let Some(sources) = &view.sources {
+            found.add(view, sources.clone(), options);
+            continue;
+        }
         let mut angles: Vec<(f64, u32)> = (0..scene.views().len())
             .filter(|&other| other != index)
-            .filter_map(|other| {
-                let points = shared.get(&(index.min(other), index.max(other)));
-                let angle = match points {
-                    Some(angles) if angles.len() >= MIN_SHARED_POINTS => percentile(angles.clone()),
-                    _ => percentile(angles_at_middle_depth(scene, index, other)),
-                };
-                angle.map(|angle| (angle, other as u32))
-            })
+            .filter_map(|other| Some((angle_of_pair(scene, &shared, index, other)?, other as u32)))
             .collect();
         angles.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let (min, max) = options.triangulation_angle;
@@ -53,17 +53,38 @@ pub fn source_lists(scene: &Scene, options: &Options) -> SourceLists {
         if options.max_sources > 0 {
             list.truncate(options.max_sources as usize);
         }
+        found.add(view, list, options);
+    }
+    found
+}
+
+/// The triangulation angle between two views in degrees, as [`source_lists`] reckons it: the 75th percentile of the
+/// angles at the sparse points both saw or, without enough of them, of those at the first view's middle depth; `None`
+/// when they see nothing together.
+pub fn triangulation_angle(scene: &Scene, reference: usize, source: usize) -> Option<f64> {
+    angle_of_pair(scene, &shared_angles(scene), reference, source)
+}
+
+fn angle_of_pair(scene: &Scene, shared: &SharedAngles, reference: usize, source: usize) -> Option<f64> {
+    match shared.get(&(reference.min(source), reference.max(source))) {
+        Some(angles) if angles.len() >= MIN_SHARED_POINTS => percentile(angles.clone()),
+        _ => percentile(angles_at_middle_depth(scene, reference, source)),
+    }
+}
+
+impl SourceLists {
+    /// The list of the next view, with a warning when it is too short for anything to be validated.
+    fn add(&mut self, view: &View, list: Vec<u32>, options: &Options) {
         let needed = options.min_consistent as usize;
         if (1..needed).contains(&list.len()) {
-            found.warnings.push(format!(
+            self.warnings.push(format!(
                 "{} has {} source view(s), but {needed} must agree with a solution: nothing can be validated in it",
                 view.name,
                 list.len()
             ));
         }
-        found.lists.push(list);
+        self.lists.push(list);
     }
-    found
 }
 
 fn describe_fallback(name: &str, taken: &[(f64, u32)], options: &Options) -> String {
@@ -80,9 +101,9 @@ fn describe_fallback(name: &str, taken: &[(f64, u32)], options: &Options) -> Str
 }
 
 /// For each pair of views the angles, in degrees, at the sparse points both saw.
-fn shared_angles(scene: &Scene) -> HashMap<(usize, usize), Vec<f64>> {
+fn shared_angles(scene: &Scene) -> SharedAngles {
     let centres: Vec<DVec3> = scene.views().iter().map(|view| view.camera.centre()).collect();
-    let mut shared: HashMap<(usize, usize), Vec<f64>> = HashMap::new();
+    let mut shared = SharedAngles::new();
     for point in scene.points() {
         let mut views: Vec<usize> = point.views.iter().map(|&view| view as usize).collect();
         views.sort_unstable();

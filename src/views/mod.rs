@@ -6,7 +6,7 @@ mod reference;
 mod select;
 mod set;
 
-pub use angle::{SourceLists, source_lists};
+pub use angle::{SourceLists, source_lists, triangulation_angle};
 pub use reference::{Reference, Source};
 pub use select::{ViewRules, faces_source, is_occluded};
 pub use set::ViewSets;

@@ -23,6 +23,11 @@ impl ViewSets {
         sets
     }
 
+    /// The sets of these pixels, in their order.
+    pub(crate) fn of(&self, pixels: impl Iterator<Item = usize>) -> ViewSets {
+        ViewSets { words: self.words, bits: pixels.flat_map(|pixel| self.words_of(pixel)).copied().collect() }
+    }
+
     /// Whether the pixel's set holds the source at this place of the list.
     pub fn contains(&self, pixel: usize, source: usize) -> bool {
         self.bits[pixel * self.words + source / 32] >> (source % 32) & 1 != 0

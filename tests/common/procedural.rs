@@ -130,6 +130,7 @@ impl Procedural {
             camera: *camera,
             mask: None,
             depth_range: None,
+            sources: None,
         });
         let truth = cameras.iter().map(|camera| truth(&surfaces, camera)).collect();
         let mut made = Procedural { views: views.collect(), points: Vec::new(), truth, surfaces };

@@ -1,0 +1,258 @@
+//! The steps of one view: propagation, search, check.
+
+use super::prepare::Steps;
+use super::state::State;
+use crate::ambc::{BAND_ROWS, CostRules, FoodSource, Offer, Search, stream};
+use crate::consistency::{self, ConsistencyRules};
+use crate::error::{Error, Result};
+use crate::image::ScaledView;
+use crate::maps::CycleRecord;
+use crate::options::Aggregation;
+use crate::progress::{Hook, Phase, Tracker};
+use crate::propagation::{self, Giver};
+use crate::state::{Solution, ViewState};
+use crate::views::{Reference, Source, ViewRules, ViewSets};
+
+/// The planes other views offer to the pixels of a view; nothing on a scale's first cycle or with propagation off.
+#[derive(Debug, Clone, Default)]
+pub struct Offers(Vec<Offer>);
+
+/// What a check says of every pixel of a view.
+#[derive(Debug, Clone)]
+pub struct Verdicts(Vec<(u8, bool)>);
+
+impl Steps {
+    /// The planes other views offer to a view in a step.
+    ///
+    /// # Errors
+    /// A step or view there is not; states of another scale, scene or view than they stand for, or not yet marked.
+    pub fn propagate(&self, step: usize, view: usize, states: &[Option<&State>]) -> Result<Offers> {
+        self.check_states(step, view, states)?;
+        let target = states.get(view).copied().flatten();
+        let (Some(target), true, true) = (target, self.options.propagation, self.all()[step].cycle > 0)
+        else {
+            return Ok(Offers::default());
+        };
+        let mut givers = Vec::new();
+        for (giver, state) in states.iter().enumerate() {
+            let Some(state) = state else { continue };
+            state.require_marked(giver, true)?;
+            if self.sources(giver).contains(&(view as u32)) {
+                let camera = &self.scaled(step, giver).camera;
+                givers.push(Giver { view: giver, camera, state: &state.solved });
+            }
+        }
+        let ScaledView { camera, range, .. } = self.scaled(step, view);
+        Ok(Offers(propagation::offers(camera, &target.solved, *range, &givers)))
+    }
+
+    /// Searches a view in a step, starting from its own state, helped by what is validated in its sources and by
+    /// what is offered. Without a state of its own it starts at random.
+    ///
+    /// # Errors
+    /// What [`Steps::propagate`] refuses; offers of another size; [`Error::Cancelled`] when the hook breaks.
+    pub fn search(
+        &self,
+        step: usize,
+        view: usize,
+        states: &[Option<&State>],
+        offers: Option<&Offers>,
+        hook: Hook,
+    ) -> Result<State> {
+        self.check_place(step, view)?;
+        let at = self.all()[step].progress(Phase::Search, view, self.views());
+        let tracker =
+            Tracker::new(hook, self.all()[step].work_on(self.scaled(step, view).camera.pixels() as u64));
+        self.search_with(step, view, states, offers, &|units| tracker.advance(units, at))
+    }
+
+    /// [`Steps::search`] that hands finished units of work to `advance`, which answers `true` to cancel.
+    pub(super) fn search_with(
+        &self,
+        step: usize,
+        view: usize,
+        states: &[Option<&State>],
+        offers: Option<&Offers>,
+        advance: &(dyn Fn(u64) -> bool + Sync),
+    ) -> Result<State> {
+        self.check_states(step, view, states)?;
+        for (place, state) in states.iter().enumerate() {
+            state.map_or(Ok(()), |state| state.require_marked(place, true))?;
+        }
+        let own = states.get(view).copied().flatten();
+        let schedule = self.all()[step];
+        let ScaledView { camera, mask, .. } = self.scaled(step, view);
+        let offers = offers.map(|offers| &offers.0[..]).filter(|offers| !offers.is_empty());
+        if let Some(offers) = offers
+            && offers.len() != camera.pixels()
+        {
+            let expected = format!("one for each of {} pixels", camera.pixels());
+            return Err(Error::argument("offers", format!("{} values", offers.len()), expected));
+        }
+        let mut state = State {
+            view,
+            step,
+            marked: false,
+            solved: ViewState::default(),
+            counts: own.map(State::counts).unwrap_or_default(),
+            cycles: own.map(|own| own.cycles.clone()).unwrap_or_default(),
+        };
+        if self.sources(view).is_empty() {
+            let solutions = vec![Solution::default(); camera.pixels()];
+            let (cost, sets) = (vec![0.0; solutions.len()], ViewSets::empty(solutions.len(), 0));
+            state.solved = ViewState { solutions, cost, sets, ..ViewState::default() };
+        } else {
+            let start = own.map(|own| &own.solved.solutions[..]);
+            let is_guided = states.iter().any(Option::is_some);
+            let reference = self.reference(step, view, states);
+            // A band of one colour has half of its pixels.
+            let band = u64::from(camera.width) * BAND_ROWS as u64 * u64::from(schedule.scale.foods) / 2;
+            let cancelled = || advance(band);
+            let cycle = u64::from(schedule.cycle);
+            let search = Search {
+                mask: mask.as_deref(),
+                start,
+                offers,
+                foods: schedule.scale.foods as usize,
+                iterations: schedule.iterations(),
+                around_start: self.around_start(schedule.cycle),
+                stream: stream(&[self.options.seed, view as u64, schedule.scale_index as u64, cycle]),
+                ..self.plain_search(&reference, is_guided, &cancelled)
+            };
+            let found = search.run()?;
+            state.counts += found.counts;
+            let solution = |food: &FoodSource| Solution {
+                depth: food.depth,
+                normal: food.normal,
+                ..Solution::default()
+            };
+            state.solved = ViewState {
+                solutions: found.best.iter().map(solution).collect(),
+                cost: found.best.iter().map(|food| food.cost).collect(),
+                sets: found.sets,
+                surface: Vec::new(),
+            };
+        }
+        let solutions = &state.solved.solutions;
+        state.cycles.push(CycleRecord {
+            reduction: schedule.reduction(),
+            cycle: schedule.cycle,
+            pixels: solutions.iter().filter(|solution| solution.depth > 0.0).count() as u64,
+            changed: count_changed(own.map_or(&[], |own| &own.solved.solutions), solutions),
+            validated: 0,
+        });
+        Ok(state)
+    }
+
+    /// The geometric consistency check of a view against what its sources have just found. A source whose state is
+    /// `None` cannot speak.
+    ///
+    /// # Errors
+    /// A step or view there is not; states of another scale, scene or view than they stand for, or already marked; no
+    /// state of the view itself.
+    pub fn check(&self, step: usize, view: usize, states: &[Option<&State>]) -> Result<Verdicts> {
+        self.check_states(step, view, states)?;
+        let Some(own) = states.get(view).copied().flatten() else {
+            return Err(missing(view));
+        };
+        own.require_marked(view, false)?;
+        let reference = self.reference(step, view, states);
+        let sources: Vec<Option<&ViewState>> = self
+            .sources(view)
+            .iter()
+            .map(|&source| states[source as usize].map(|state| &state.solved))
+            .collect();
+        let rules = ConsistencyRules::new(&self.options);
+        Ok(Verdicts(consistency::check(&reference, &own.solved, &sources, &rules)))
+    }
+
+    /// Writes the verdicts of a check into the state they were made for: what is validated guides the next search.
+    ///
+    /// # Errors
+    /// Another view than the state's; a state that is marked already or has another size.
+    pub fn mark(&self, view: usize, state: &mut State, verdicts: &Verdicts) -> Result<()> {
+        state.require_marked(view, false)?;
+        if state.view() != view || verdicts.0.len() != state.pixels() {
+            let value = format!("{} pixels of view {view}", verdicts.0.len());
+            let expected =
+                format!("the {} pixels of view {}, whose state it is", state.pixels(), state.view());
+            return Err(Error::argument("verdicts", value, expected));
+        }
+        state.solved.mark(&self.scaled(state.step(), view).camera, &verdicts.0);
+        state.marked = true;
+        let validated = state.solved.validated();
+        if let Some(record) = state.cycles.last_mut() {
+            record.validated = validated;
+        }
+        Ok(())
+    }
+
+    /// A search with everything that all searches have in common; one that is guided has validated solutions to look at.
+    pub(super) fn plain_search<'b>(
+        &'b self,
+        reference: &'b Reference<'b>,
+        is_guided: bool,
+        cancelled: &'b (dyn Fn() -> bool + Sync),
+    ) -> Search<'b> {
+        // The paper's cost is infinite for a single view; the mean of the best needs two to be worth anything.
+        let min_views = if self.options.aggregation == Aggregation::AllViews { 0 } else { 2 };
+        Search {
+            reference,
+            window: &self.window,
+            cost_rules: CostRules::new(&self.options, is_guided),
+            view_rules: ViewRules::new(&self.options, min_views),
+            mask: None,
+            start: None,
+            offers: None,
+            foods: 0,
+            iterations: 0,
+            trial_limit: self.options.trial_limit.min(u32::from(u16::MAX)) as u16,
+            reward: self.options.reward as f32,
+            focused_views: self.options.focused_views as usize,
+            around_start: (0.0, 0.0),
+            stream: 0,
+            level: self.level,
+            cancelled,
+        }
+    }
+
+    fn around_start(&self, cycle: u32) -> (f32, f32) {
+        let shrink = 0.5f64.powi(cycle.min(64) as i32);
+        ((self.options.restart_spread * shrink) as f32, (self.options.restart_tilt * shrink) as f32)
+    }
+
+    /// A view and its sources, which show their validated surfaces as far as there are any.
+    pub(super) fn reference<'b>(
+        &'b self,
+        step: usize,
+        view: usize,
+        states: &[Option<&'b State>],
+    ) -> Reference<'b> {
+        let ScaledView { camera, image, range, .. } = self.scaled(step, view);
+        let mut reference = Reference::new(camera, image, *range);
+        for &source in self.sources(view) {
+            let source = source as usize;
+            let ScaledView { camera: other, image, .. } = self.scaled(step, source);
+            let surface =
+                states.get(source).copied().flatten().map_or(&[][..], |state| &state.solved.surface);
+            reference.sources.push(Source::new(camera, other, image, surface));
+        }
+        reference
+    }
+}
+
+/// The error of a step that needs the view's own state.
+pub(super) fn missing(view: usize) -> Error {
+    Error::argument(format!("states[{view}]"), "none", "the state of the view itself")
+}
+
+/// A solution changed when its depth moved by more than this share.
+const CHANGE: f32 = 1e-3;
+
+fn count_changed(before: &[Solution], after: &[Solution]) -> u64 {
+    let changed = |(pixel, solution): &(usize, &Solution)| {
+        let before = before.get(*pixel).map_or(0.0, |solution| solution.depth);
+        solution.depth > 0.0 && (solution.depth - before).abs() > CHANGE * solution.depth
+    };
+    after.iter().enumerate().filter(changed).count() as u64
+}

@@ -1,0 +1,167 @@
+//! What is known of one view between two steps.
+
+use super::prepare::Steps;
+use crate::error::{Error, Result};
+use crate::maps::{Counts, CycleRecord, Maps};
+use crate::state::{Solution, ViewState};
+use crate::views::ViewSets;
+use glam::Vec3;
+
+/// What is known of one view after it was searched in a step or, once it is marked, after the check of that step.
+#[derive(Debug, Clone)]
+pub struct State {
+    pub(super) view: usize,
+    pub(super) step: usize,
+    pub(super) marked: bool,
+    pub(super) solved: ViewState,
+    pub(super) counts: Counts,
+    pub(super) cycles: Vec<CycleRecord>,
+}
+
+/// A host's own maps of a view, to start from or to check others against.
+#[derive(Debug, Clone, Copy)]
+pub struct OwnMaps<'a> {
+    /// Depth and normal of every pixel on the step's scale.
+    pub maps: &'a Maps,
+    /// Which solutions count as validated; `None` validates all that have a depth.
+    pub validated: Option<&'a [bool]>,
+    /// Cost of each solution, which ranks what is offered to other views; `None` is 0.
+    pub cost: Option<&'a [f32]>,
+}
+
+impl State {
+    /// The state of a view whose maps the host brings, as if it had been checked in this step.
+    ///
+    /// # Errors
+    /// A step or view there is not; maps of another size than the view has in the step; a depth that is negative or not
+    /// finite; a normal that is not unit or turned away from the camera where there is a depth; a cost that is negative
+    /// or not a number.
+    pub fn from_maps(steps: &Steps, step: usize, view: usize, own: &OwnMaps) -> Result<State> {
+        let (width, height) = steps.size(step, view)?;
+        let pixels = width as usize * height as usize;
+        let lengths = [
+            ("maps.depth", Some(own.maps.depth.len())),
+            ("maps.normal", Some(own.maps.normal.len())),
+            ("validated", own.validated.map(<[bool]>::len)),
+            ("cost", own.cost.map(<[f32]>::len)),
+        ];
+        for (name, length) in lengths {
+            if length.is_some_and(|length| length != pixels) {
+                let value = format!("{} values", length.unwrap_or(0));
+                return Err(Error::argument(
+                    name,
+                    value,
+                    format!("one for each of {width} x {height} pixels"),
+                ));
+            }
+        }
+        let camera = &steps.scaled(step, view).camera;
+        let mut solutions = vec![Solution::default(); pixels];
+        for (pixel, solution) in solutions.iter_mut().enumerate() {
+            let (depth, normal) = (own.maps.depth[pixel], Vec3::from_array(own.maps.normal[pixel]));
+            let place = (pixel % width as usize, pixel / width as usize);
+            let name = |map: &str| format!("{map} at column {}, row {}", place.0, place.1);
+            if !(depth.is_finite() && depth >= 0.0) {
+                return Err(Error::argument(name("depth"), depth, "a finite depth above 0, or 0 for none"));
+            }
+            if let Some(cost) = own.cost.map(|cost| cost[pixel])
+                && !(cost >= 0.0)
+            {
+                return Err(Error::argument(name("cost"), cost, "a number of at least 0"));
+            }
+            if depth == 0.0 {
+                continue;
+            }
+            let ray = camera.ray(glam::DVec2::new(place.0 as f64, place.1 as f64)).as_vec3();
+            if !((normal.length() - 1.0).abs() < 1e-2 && normal.dot(ray) < 0.0) {
+                let expected = "a unit vector that faces the camera (n . ray < 0)";
+                return Err(Error::argument(name("normal"), normal, expected));
+            }
+            let validated = own.validated.is_none_or(|validated| validated[pixel]);
+            let consistent = if validated { steps.options.min_consistent.min(255) as u8 } else { 0 };
+            *solution = Solution { depth, normal: normal.normalize(), consistent, validated };
+        }
+        let verdicts: Vec<(u8, bool)> =
+            solutions.iter().map(|solution| (solution.consistent, solution.validated)).collect();
+        let cost = own.cost.map_or_else(|| vec![0.0; pixels], <[f32]>::to_vec);
+        let sets = ViewSets::full(pixels, steps.sources(view).len());
+        let mut solved = ViewState { solutions, cost, sets, ..ViewState::default() };
+        solved.mark(camera, &verdicts);
+        Ok(State { view, step, marked: true, solved, counts: Counts::default(), cycles: Vec::new() })
+    }
+
+    /// The view it is of.
+    pub fn view(&self) -> usize {
+        self.view
+    }
+
+    /// The step it was searched in, or whose scale it was handed up to.
+    pub fn step(&self) -> usize {
+        self.step
+    }
+
+    /// Whether it carries the verdicts of a check.
+    pub fn is_marked(&self) -> bool {
+        self.marked
+    }
+
+    /// Number of pixels on its scale.
+    pub fn pixels(&self) -> usize {
+        self.solved.solutions.len()
+    }
+
+    /// Depth and normal of every pixel, validated or not.
+    pub fn maps(&self) -> Maps {
+        let solutions = &self.solved.solutions;
+        Maps {
+            depth: solutions.iter().map(|solution| solution.depth).collect(),
+            normal: solutions.iter().map(|solution| solution.normal.to_array()).collect(),
+        }
+    }
+
+    /// Aggregated cost of every pixel's solution.
+    pub fn cost(&self) -> &[f32] {
+        &self.solved.cost
+    }
+
+    /// For every pixel the number of source views consistent with its solution, at most 255, and whether that validates
+    /// it; nothing before it is marked.
+    pub fn verdicts(&self) -> impl ExactSizeIterator<Item = (u8, bool)> + '_ {
+        self.solved.solutions.iter().map(|solution| (solution.consistent, solution.validated))
+    }
+
+    /// The view set each pixel was matched with.
+    pub fn view_sets(&self) -> &ViewSets {
+        &self.solved.sets
+    }
+
+    /// Work done for the view so far.
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// The cycles of the view so far.
+    pub fn cycles(&self) -> &[CycleRecord] {
+        &self.cycles
+    }
+
+    pub(super) fn fits(&self, width: u32, height: u32, sources: usize) -> bool {
+        let pixels = width as usize * height as usize;
+        let words = ViewSets::empty(0, sources).words_per_pixel();
+        self.pixels() == pixels && self.solved.sets.words_per_pixel() == words
+    }
+
+    /// Refuses a state that is (not) marked.
+    pub(super) fn require_marked(&self, place: usize, marked: bool) -> Result<()> {
+        if self.marked == marked {
+            return Ok(());
+        }
+        let state = |marked| if marked { "checked in its step" } else { "searched and not yet checked" };
+        Err(Error::argument(format!("states[{place}]"), state(self.marked), state(marked)))
+    }
+
+    pub(super) fn on_finer_scale(&self, step: usize, solved: ViewState) -> State {
+        let (counts, cycles) = (self.counts, self.cycles.clone());
+        State { view: self.view, step, marked: true, solved, counts, cycles }
+    }
+}
