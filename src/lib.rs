@@ -5,6 +5,8 @@
 
 mod ambc;
 pub mod camera;
+#[cfg(feature = "capi")]
+mod capi;
 mod consistency;
 mod error;
 pub mod fusion;

@@ -90,6 +90,8 @@ pub struct CycleRecord {
 /// The result of one view.
 #[derive(Debug, Clone)]
 pub struct ViewResult {
+    /// Width of all maps in pixels.
+    pub width: u32,
     /// The raw estimate of every pixel that is not masked.
     pub estimate: Maps,
     /// Mean `1 - NCC` of the estimate over the pixel's view set, 0 to 2; lower is surer.
@@ -107,6 +109,11 @@ pub struct ViewResult {
 }
 
 impl ViewResult {
+    /// Width and height of all maps.
+    pub fn size(&self) -> (u32, u32) {
+        (self.width, (self.outcome.len() / (self.width as usize).max(1)) as u32)
+    }
+
     /// The maps with only what was validated left in them.
     pub fn filtered(&self) -> Maps {
         let mut maps = self.estimate.clone();
@@ -160,6 +167,11 @@ impl PointViews {
     pub fn get(&self, point: usize) -> &[u32] {
         let start = if point == 0 { 0 } else { self.ends[point - 1] };
         &self.views[start..self.ends[point]]
+    }
+
+    /// Lengths of all lists added up.
+    pub fn total(&self) -> usize {
+        self.views.len()
     }
 
     /// Number of points.

@@ -188,7 +188,7 @@ impl Options {
     pub fn check(&self) -> Result<()> {
         self.check_scales()?;
         for entry in TABLE {
-            entry.kind.check(entry.name, (entry.get)(self))?;
+            entry.kind.check(entry.name(), (entry.get)(self))?;
         }
         let (min, max) = self.triangulation_angle;
         Kind::Number(min, 180.0).check("triangulation_angle.max", max)?;
@@ -205,7 +205,7 @@ impl Options {
         Ok(())
     }
 
-    fn check_scales(&self) -> Result<()> {
+    pub(crate) fn check_scales(&self) -> Result<()> {
         let descending = self.scales.windows(2).all(|pair| pair[0].halvings == pair[1].halvings + 1);
         if !descending || self.scales.last().is_none_or(|last| last.halvings != 0) {
             let halvings: Vec<u32> = self.scales.iter().map(|scale| scale.halvings).collect();
@@ -247,7 +247,7 @@ impl Options {
             ("simd", simd),
             ("scales", self.scales.iter().map(scale).collect::<Vec<_>>().join("; ")),
         ];
-        entries.extend(TABLE.iter().map(|entry| (entry.name, (entry.get)(self).to_string())));
+        entries.extend(TABLE.iter().map(|entry| (entry.name(), (entry.get)(self).to_string())));
         entries
     }
 }

@@ -1,21 +1,22 @@
 //! Pictures handed in by the host, and their reduction to half size.
 
 use crate::error::{Error, Result};
+use std::sync::Arc;
 
-/// A photograph: grey values for matching and, when there are any, colours for the points.
+/// A photograph: grey values for matching and, when there are any, colours for the points. Clones share the pixels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Picture {
     width: u32,
     height: u32,
-    grey: Vec<u8>,
-    colour: Option<Vec<[u8; 3]>>,
+    grey: Arc<Vec<u8>>,
+    colour: Option<Arc<Vec<[u8; 3]>>>,
 }
 
 impl Picture {
     /// From grey values, row by row, `width * height` of them.
     pub fn from_grey(width: u32, height: u32, grey: Vec<u8>) -> Result<Picture> {
         check_size("picture.grey", width, height, grey.len())?;
-        Ok(Picture { width, height, grey, colour: None })
+        Ok(Picture { width, height, grey: Arc::new(grey), colour: None })
     }
 
     /// From red, green and blue, row by row, `width * height` of them. Grey is their luma (ITU-R BT.601).
@@ -24,7 +25,8 @@ impl Picture {
         let luma = |&[r, g, b]: &[u8; 3]| {
             ((u32::from(r) * 299 + u32::from(g) * 587 + u32::from(b) * 114 + 500) / 1000) as u8
         };
-        Ok(Picture { width, height, grey: colour.iter().map(luma).collect(), colour: Some(colour) })
+        let grey = Arc::new(colour.iter().map(luma).collect());
+        Ok(Picture { width, height, grey, colour: Some(Arc::new(colour)) })
     }
 
     /// Width in pixels.
@@ -40,6 +42,11 @@ impl Picture {
     /// Grey values row by row.
     pub fn grey(&self) -> &[u8] {
         &self.grey
+    }
+
+    /// Red, green and blue row by row, when it has colours.
+    pub fn colour(&self) -> Option<&[[u8; 3]]> {
+        self.colour.as_ref().map(|colour| &colour[..])
     }
 
     /// Red, green and blue of the pixel with this index (row * width + column); grey thrice without colours.
@@ -66,7 +73,7 @@ impl Picture {
                 grey.push(((sum + 2) / 4) as u8);
             }
         }
-        Picture { width, height, grey, colour: None }
+        Picture { width, height, grey: Arc::new(grey), colour: None }
     }
 }
 

@@ -31,6 +31,22 @@ pub fn write_file(
     attempt().map_err(|error| Error::file(path, format!("cannot be written: {error}")))
 }
 
+/// Makes a file appear in a second place; a file that cannot be linked there is copied.
+pub(super) fn link_or_copy(from: &Path, to: &Path) -> Result<()> {
+    let parent = to.parent().unwrap_or(Path::new("."));
+    let attempt = || -> io::Result<()> {
+        std::fs::create_dir_all(parent)?;
+        if std::fs::hard_link(from, to).is_ok() {
+            return Ok(());
+        }
+        let mut temporary = tempfile::NamedTempFile::new_in(parent)?;
+        io::copy(&mut File::open(from)?, temporary.as_file_mut())?;
+        temporary.persist(to)?;
+        Ok(())
+    };
+    attempt().map_err(|error| Error::file(to, format!("cannot be made from {}: {error}", from.display())))
+}
+
 /// A file read from start to end, which never asks for more bytes than it holds.
 pub(super) struct FileReader {
     path: PathBuf,

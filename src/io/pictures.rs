@@ -1,12 +1,13 @@
-//! Photographs from PNG and JPEG files.
+//! Photographs from PNG and JPEG files, and to PNG files.
 
-use super::files::cannot_be_read;
+use super::files::{cannot_be_read, write_file};
 use crate::camera::Camera;
 use crate::error::Result;
 use crate::image::Picture;
-use image::{ColorType, DynamicImage, ImageReader, Limits};
+use image::codecs::png::PngEncoder;
+use image::{ColorType, DynamicImage, ExtendedColorType, ImageEncoder, ImageReader, Limits};
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{self, BufReader};
 use std::path::Path;
 
 /// Reads a PNG or JPEG file, colour or grey, 8 or 16 bits (16 are rounded to 8). An alpha channel is dropped; nothing
@@ -23,6 +24,18 @@ pub fn read_picture(path: &Path) -> Result<Picture> {
 /// Width and height of a PNG or JPEG file, from its header.
 pub fn picture_size(path: &Path) -> Result<(u32, u32)> {
     open(path)?.into_dimensions().map_err(|error| cannot_be_read(path, error))
+}
+
+/// Writes a picture as PNG, in colour when it has colours.
+pub fn write_picture(path: &Path, picture: &Picture) -> Result<()> {
+    let (bytes, colour) = match picture.colour() {
+        Some(colour) => (colour.as_flattened(), ExtendedColorType::Rgb8),
+        None => (picture.grey(), ExtendedColorType::L8),
+    };
+    write_file(path, |out| {
+        let encoder = PngEncoder::new(out);
+        encoder.write_image(bytes, picture.width(), picture.height(), colour).map_err(io::Error::other)
+    })
 }
 
 fn is_grey(image: &DynamicImage) -> bool {

@@ -1,12 +1,12 @@
 //! Scenes from a folder with `images/` and `sparse/` or `sparse/0/`, as COLMAP's image_undistorter writes it.
 
 use super::colmap_model::ColmapModel;
-use super::pictures::{picture_size, read_picture};
+use super::pictures::{picture_size, read_picture, write_picture};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::image::Picture;
 use crate::scene::{DepthRange, Scene, View};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// Where a scene's photographs and model lie.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -73,4 +73,27 @@ pub fn read_scene(folder: &Path, depth_range: Option<DepthRange>) -> Result<Scen
     };
     let views = model.images.into_iter().map(view).collect::<Result<_>>()?;
     Scene::new(views, model.points)
+}
+
+/// Writes a scene as a folder: its photographs as PNG files under their views' names in `images/`, and a binary model in
+/// `sparse/`.
+///
+/// # Errors
+/// A view whose name does not end in `.png` or leads out of the folder; a file that cannot be written.
+pub fn write_scene(folder: &Path, scene: &Scene) -> Result<()> {
+    for (index, view) in scene.views().iter().enumerate() {
+        let path = Path::new(&view.name);
+        let inside = path.components().all(|part| matches!(part, Component::Normal(_)));
+        let is_png = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
+        if !(inside && is_png) {
+            let expected = "a name that ends in .png and stays inside its folder";
+            return Err(Error::argument(format!("views[{index}].name"), &view.name, expected));
+        }
+    }
+    for view in scene.views() {
+        write_picture(&folder.join("images").join(&view.name), &view.picture)?;
+    }
+    let image = |view: &View| super::ModelImage { name: view.name.clone(), camera: view.camera };
+    let images = scene.views().iter().map(image).collect();
+    ColmapModel { images, points: scene.points().to_vec() }.write_binary(&folder.join("sparse"))
 }

@@ -4,7 +4,7 @@ use super::colmap_maps::{
     Grid, read_depth_map, read_normal_map, write_consistency_graph, write_depth_map, write_normal_map,
 };
 use super::colmap_model::ColmapModel;
-use super::files::cannot_be_read;
+use super::files::{cannot_be_read, link_or_copy, write_file};
 use super::ply::{write_ply, write_visibility};
 use super::previews::{write_depth_preview, write_normal_preview, write_views_preview};
 use super::scene_folder::SceneFolder;
@@ -13,6 +13,7 @@ use crate::error::{Error, Result};
 use crate::image::Picture;
 use crate::maps::{Maps, PointCloud, ViewResult};
 use crate::scene::SparsePoint;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Which of a view's maps.
@@ -92,6 +93,37 @@ impl Workspace {
         write_views_preview(&self.preview(name, "views"), width, height, result.sources.len(), |pixel| {
             if filtered.depth[pixel] > 0.0 { result.view_sets.count(pixel) } else { 0 }
         })
+    }
+
+    /// Writes `stereo/patch-match.cfg` and `stereo/fusion.cfg`, the lists of images without which COLMAP does not start.
+    pub fn write_lists<'a>(&self, names: impl Iterator<Item = &'a str> + Clone) -> Result<()> {
+        let stereo = self.folder.join("stereo");
+        write_file(&stereo.join("fusion.cfg"), |out| {
+            names.clone().try_for_each(|name| writeln!(out, "{name}"))
+        })?;
+        // The second line lets COLMAP choose the source views itself.
+        write_file(&stereo.join("patch-match.cfg"), |out| {
+            names.clone().try_for_each(|name| writeln!(out, "{name}\n__auto__, 20"))
+        })
+    }
+
+    /// Makes the folder a workspace that COLMAP reads: photographs and model of the scene beside the maps. Photographs
+    /// are linked where the file system can, else copied; what is there already stays.
+    pub fn adopt(&self, scene: &SceneFolder) -> Result<()> {
+        let ColmapModel { images, .. } = ColmapModel::read(&scene.sparse)?;
+        let photographs = images
+            .iter()
+            .map(|image| (scene.images.join(&image.name), self.folder.join("images").join(&image.name)));
+        let model = ["cameras", "images", "points3D"].into_iter().flat_map(|stem| {
+            ["bin", "txt"].map(|extension| {
+                let name = format!("{stem}.{extension}");
+                (scene.sparse.join(&name), self.folder.join("sparse").join(&name))
+            })
+        });
+        photographs
+            .chain(model)
+            .filter(|(from, to)| from.is_file() && !to.exists())
+            .try_for_each(|(from, to)| link_or_copy(&from, &to))
     }
 
     fn write_maps(

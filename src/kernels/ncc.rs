@@ -28,6 +28,9 @@ struct Offsets {
 }
 
 impl Window {
+    /// The largest half side, in pixels.
+    pub const MAX_RADIUS: u32 = 16;
+
     /// A square of half side `radius` sampled every `step` pixels; sigmas in pixels and in intensities of [0, 1],
     /// the smallest variance in intensities of [0, 1] too.
     pub fn new(radius: u32, step: u32, spatial_sigma: f64, colour_sigma: f64, min_variance: f64) -> Window {
@@ -67,13 +70,17 @@ impl Window {
     }
 }
 
+/// Vectors of the largest window. Patches live on the stack: correlating allocates nothing.
+const MAX_VECTORS: usize = (2 * Window::MAX_RADIUS as usize + 1).pow(2).div_ceil(LANES);
+
 /// The reference's side of the correlation, once a pixel.
 #[derive(Debug, Clone)]
 pub struct ReferencePatch {
-    /// Weights, divided by their sum.
-    weights: Vec<[f32; LANES]>,
+    vectors: usize,
+    /// Weights, divided by their sum; as many vectors as the window has.
+    weights: [[f32; LANES]; MAX_VECTORS],
     /// Weights times difference to the mean, divided by the standard deviation.
-    weighted: Vec<[f32; LANES]>,
+    weighted: [[f32; LANES]; MAX_VECTORS],
     /// Weighted mean of the grey values.
     mean: f32,
     /// Weighted variance of the grey values.
@@ -83,8 +90,14 @@ pub struct ReferencePatch {
 impl ReferencePatch {
     /// Room for a patch of this window.
     pub fn new(window: &Window) -> ReferencePatch {
-        let zeros = vec![[0.0; LANES]; window.offsets.len()];
-        ReferencePatch { weights: zeros.clone(), weighted: zeros, mean: 0.0, variance: 0.0 }
+        let zeros = [[0.0; LANES]; MAX_VECTORS];
+        ReferencePatch {
+            vectors: window.offsets.len(),
+            weights: zeros,
+            weighted: zeros,
+            mean: 0.0,
+            variance: 0.0,
+        }
     }
 
     /// Whether the patch varies enough to be matched.
@@ -130,7 +143,7 @@ impl ReferencePatch {
     fn normalise<S: Simd>(&mut self, simd: S, scale: f32) {
         let (mean, scale) = (simd.splat(self.mean), simd.splat(scale));
         let mut squares = simd.splat(0.0);
-        for (weight, weighted) in self.weights.iter_mut().zip(&mut self.weighted) {
+        for (weight, weighted) in self.weights[..self.vectors].iter_mut().zip(&mut self.weighted) {
             let difference = simd.sub(simd.load(weighted), mean);
             let share = simd.mul(simd.load(weight), scale);
             let product = simd.mul(share, difference);
@@ -140,7 +153,7 @@ impl ReferencePatch {
         }
         self.variance = simd.sum(squares);
         let inverse_deviation = simd.splat(1.0 / self.variance.max(f32::MIN_POSITIVE).sqrt());
-        for weighted in &mut self.weighted {
+        for weighted in &mut self.weighted[..self.vectors] {
             *weighted = simd.store(simd.mul(simd.load(weighted), inverse_deviation));
         }
     }

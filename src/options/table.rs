@@ -2,6 +2,7 @@
 
 use super::{Aggregation, Options};
 use crate::error::{Error, Result};
+use std::ffi::CStr;
 
 /// What values an option takes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,7 +17,7 @@ pub(super) enum Kind {
 
 /// An option.
 pub(super) struct Entry {
-    pub name: &'static str,
+    c_name: &'static CStr,
     pub kind: Kind,
     pub get: fn(&Options) -> f64,
     set: fn(&mut Options, f64),
@@ -26,7 +27,7 @@ pub(super) struct Entry {
 macro_rules! entry {
     (whole $name:literal, $min:expr, $max:expr, $($field:ident).+ as $type:ty) => {
         Entry {
-            name: $name,
+            c_name: $name,
             kind: Kind::Whole($min, $max),
             get: |options| options.$($field).+ as f64,
             set: |options, value| options.$($field).+ = value as $type,
@@ -34,7 +35,7 @@ macro_rules! entry {
     };
     (number $name:literal, $min:expr, $max:expr, $($field:tt).+) => {
         Entry {
-            name: $name,
+            c_name: $name,
             kind: Kind::Number($min, $max),
             get: |options| options.$($field).+,
             set: |options, value| options.$($field).+ = value,
@@ -42,7 +43,7 @@ macro_rules! entry {
     };
     (switch $name:literal, $field:ident) => {
         Entry {
-            name: $name,
+            c_name: $name,
             kind: Kind::Switch,
             get: |options| f64::from(u8::from(options.$field)),
             set: |options, value| options.$field = value != 0.0,
@@ -52,16 +53,16 @@ macro_rules! entry {
 
 /// The table, in the order of the fields of [`Options`].
 pub(super) const TABLE: &[Entry] = &[
-    entry!(whole "threads", 0, 4096, threads as usize),
-    entry!(whole "trial_limit", 0, u32::MAX, trial_limit as u32),
-    entry!(number "stop_share", 0.0, 1.0, stop_share),
-    entry!(whole "window_radius", 1, 16, window_radius as u32),
-    entry!(whole "window_step", 1, 8, window_step as u32),
-    entry!(number "spatial_sigma", 1e-3, 1e6, spatial_sigma),
-    entry!(number "colour_sigma", 1e-3, 1e6, colour_sigma),
-    entry!(number "min_variance", 0.0, 1.0, min_variance),
+    entry!(whole c"threads", 0, 4096, threads as usize),
+    entry!(whole c"trial_limit", 0, u32::MAX, trial_limit as u32),
+    entry!(number c"stop_share", 0.0, 1.0, stop_share),
+    entry!(whole c"window_radius", 1, 16, window_radius as u32),
+    entry!(whole c"window_step", 1, 8, window_step as u32),
+    entry!(number c"spatial_sigma", 1e-3, 1e6, spatial_sigma),
+    entry!(number c"colour_sigma", 1e-3, 1e6, colour_sigma),
+    entry!(number c"min_variance", 0.0, 1.0, min_variance),
     Entry {
-        name: "best_views",
+        c_name: c"best_views",
         kind: Kind::Whole(0, 8),
         get: |options| match options.aggregation {
             Aggregation::AllViews => 0.0,
@@ -74,29 +75,35 @@ pub(super) const TABLE: &[Entry] = &[
             }
         },
     },
-    entry!(whole "focused_views", 0, u32::MAX, focused_views as u32),
-    entry!(number "restart_spread", 0.0, 0.5, restart_spread),
-    entry!(number "restart_tilt", 0.0, 10.0, restart_tilt),
-    entry!(switch "view_selection", view_selection),
-    entry!(number "triangulation_angle.min", 0.0, 180.0, triangulation_angle.0),
-    entry!(number "triangulation_angle.max", 0.0, 180.0, triangulation_angle.1),
-    entry!(whole "max_sources", 0, u32::MAX, max_sources as u32),
-    entry!(number "max_incident_angle", 0.0, 90.0, max_incident_angle),
-    entry!(number "occlusion_margin", 0.0, 1.0, occlusion_margin),
-    entry!(number "reward", 0.0, 1.0, reward),
-    entry!(switch "propagation", propagation),
-    entry!(number "geometric_weight", 0.0, 1e3, geometric_weight),
-    entry!(number "geometric_limit", 0.0, 1e3, geometric_limit),
-    entry!(number "geometric_unknown", 0.0, 1e3, geometric_unknown),
-    entry!(number "depth_tolerance", 0.0, 1.0, depth_tolerance),
-    entry!(number "normal_tolerance", 0.0, 180.0, normal_tolerance),
-    entry!(whole "min_consistent", 1, u32::MAX, min_consistent as u32),
-    entry!(number "consistent_share", 0.0, 1.0, consistent_share),
-    entry!(switch "occluders_abstain", occluders_abstain),
-    entry!(number "fusion.depth_tolerance", 0.0, 1.0, fusion.depth_tolerance),
-    entry!(number "fusion.normal_tolerance", 0.0, 180.0, fusion.normal_tolerance),
-    entry!(whole "fusion.min_views", 0, u32::MAX, fusion.min_views as u32),
+    entry!(whole c"focused_views", 0, u32::MAX, focused_views as u32),
+    entry!(number c"restart_spread", 0.0, 0.5, restart_spread),
+    entry!(number c"restart_tilt", 0.0, 10.0, restart_tilt),
+    entry!(switch c"view_selection", view_selection),
+    entry!(number c"triangulation_angle.min", 0.0, 180.0, triangulation_angle.0),
+    entry!(number c"triangulation_angle.max", 0.0, 180.0, triangulation_angle.1),
+    entry!(whole c"max_sources", 0, u32::MAX, max_sources as u32),
+    entry!(number c"max_incident_angle", 0.0, 90.0, max_incident_angle),
+    entry!(number c"occlusion_margin", 0.0, 1.0, occlusion_margin),
+    entry!(number c"reward", 0.0, 1.0, reward),
+    entry!(switch c"propagation", propagation),
+    entry!(number c"geometric_weight", 0.0, 1e3, geometric_weight),
+    entry!(number c"geometric_limit", 0.0, 1e3, geometric_limit),
+    entry!(number c"geometric_unknown", 0.0, 1e3, geometric_unknown),
+    entry!(number c"depth_tolerance", 0.0, 1.0, depth_tolerance),
+    entry!(number c"normal_tolerance", 0.0, 180.0, normal_tolerance),
+    entry!(whole c"min_consistent", 1, u32::MAX, min_consistent as u32),
+    entry!(number c"consistent_share", 0.0, 1.0, consistent_share),
+    entry!(switch c"occluders_abstain", occluders_abstain),
+    entry!(number c"fusion.depth_tolerance", 0.0, 1.0, fusion.depth_tolerance),
+    entry!(number c"fusion.normal_tolerance", 0.0, 180.0, fusion.normal_tolerance),
+    entry!(whole c"fusion.min_views", 0, u32::MAX, fusion.min_views as u32),
 ];
+
+impl Entry {
+    pub fn name(&self) -> &'static str {
+        self.c_name.to_str().unwrap_or_default()
+    }
+}
 
 impl Kind {
     /// Refuses values of another kind or out of range; `name` is how the error calls the option.
@@ -118,7 +125,13 @@ impl Options {
     /// a range, `best_views` is the number of [`Aggregation::BestViews`] or 0 for [`Aggregation::AllViews`], and
     /// switches are 0 or 1. The seed, the scales and the instruction set are not numbers in this sense.
     pub fn names() -> impl ExactSizeIterator<Item = &'static str> {
-        TABLE.iter().map(|entry| entry.name)
+        TABLE.iter().map(Entry::name)
+    }
+
+    /// The name with this index in [`Options::names`], as C has it.
+    #[cfg(feature = "capi")]
+    pub(crate) fn c_name(index: usize) -> Option<&'static CStr> {
+        TABLE.get(index).map(|entry| entry.c_name)
     }
 
     /// The option of this name.
@@ -142,7 +155,7 @@ impl Options {
 }
 
 fn find(name: &str) -> Result<&'static Entry> {
-    let found = TABLE.iter().find(|entry| entry.name == name);
+    let found = TABLE.iter().find(|entry| entry.name() == name);
     found.ok_or_else(|| {
         let names: Vec<&str> = Options::names().collect();
         Error::argument("option", name, format!("one of {}", names.join(", ")))
@@ -159,14 +172,14 @@ mod tests {
             let before = Options::default();
             let mut options = before.clone();
             let value = match entry.kind {
-                Kind::Whole(min, _) => (before.get(entry.name).unwrap() + 1.0).max(f64::from(min)),
-                Kind::Number(min, max) => (before.get(entry.name).unwrap() + min.midpoint(max)) / 2.0,
-                Kind::Switch => 1.0 - before.get(entry.name).unwrap(),
+                Kind::Whole(min, _) => (before.get(entry.name()).unwrap() + 1.0).max(f64::from(min)),
+                Kind::Number(min, max) => (before.get(entry.name()).unwrap() + min.midpoint(max)) / 2.0,
+                Kind::Switch => 1.0 - before.get(entry.name()).unwrap(),
             };
-            options.set(entry.name, value).unwrap();
+            options.set(entry.name(), value).unwrap();
             for other in Options::names() {
-                let expected = if other == entry.name { value } else { before.get(other).unwrap() };
-                assert_eq!(options.get(other).unwrap(), expected, "{other} after {}", entry.name);
+                let expected = if other == entry.name() { value } else { before.get(other).unwrap() };
+                assert_eq!(options.get(other).unwrap(), expected, "{other} after {}", entry.name());
             }
         }
     }

@@ -49,6 +49,7 @@ impl Steps {
         counts += assessment.counts;
         let sources = self.sources(view).to_vec();
         Ok(ViewResult {
+            width: self.scaled(step, view).camera.width,
             estimate: own.maps(),
             outcome: outcomes(self.scaled(step, view), &own.solved, &assessment, sources.len()),
             cost: assessment.cost,

@@ -6,7 +6,7 @@ use crate::progress::Display;
 use crate::report::{Report, Totals};
 use crate::stopwatch::{Stage, Stopwatch};
 use crate::{Failure, streams};
-use skep::io::{Workspace, read_scene};
+use skep::io::{SceneFolder, Workspace, read_scene};
 use skep::{Error, Options, Outcome, Progress, Reconstruction, Result, Scene};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -33,7 +33,7 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
     stopwatch.enter(Stage::Writing);
     display.say(&format!("writing {}", output.display()));
     let mut report = Report::new(&scene, &arguments.preset, &options, &result);
-    write(&output, &scene, &result, &interrupt)?;
+    write(&output, &arguments.scene, &scene, &result, &interrupt)?;
     report.set_times(stopwatch.times());
     report.write(&report_path(&output))?;
 
@@ -67,7 +67,13 @@ fn require_writable(folder: &Path) -> Result<()> {
 }
 
 /// Writes every file, the report excepted; stops between two files when interrupted.
-fn write(output: &Path, scene: &Scene, result: &Reconstruction, interrupt: &Interrupt) -> Result<()> {
+fn write(
+    output: &Path,
+    folder: &Path,
+    scene: &Scene,
+    result: &Reconstruction,
+    interrupt: &Interrupt,
+) -> Result<()> {
     // A report says that everything beside it is there and belongs together: an older one must not say so meanwhile.
     let report = report_path(output);
     match std::fs::remove_file(&report) {
@@ -85,6 +91,8 @@ fn write(output: &Path, scene: &Scene, result: &Reconstruction, interrupt: &Inte
     }
     let kept = "the maps of all views are written and whole; `skep fuse` makes the cloud from them";
     interrupt.check().inspect_err(|error| explain_interruption(error, kept))?;
+    workspace.write_lists(scene.views().iter().map(|view| view.name.as_str()))?;
+    workspace.adopt(&SceneFolder::find(folder)?)?;
     Workspace::write_cloud(&workspace.cloud(), &result.points)
 }
 

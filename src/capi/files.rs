@@ -1,0 +1,263 @@
+//! Files for C programs: COLMAP scenes in, maps, clouds and whole dense folders out.
+
+use super::cloud::skep_cloud;
+use super::maps;
+use super::pointers::{get, give_list, out, path, slice, wanted};
+use super::result::skep_result;
+use super::scene::skep_scene;
+use super::status::{Failure, guard, skep_status};
+use crate::camera::Camera;
+use crate::io::{self, Workspace};
+use crate::scene::DepthRange;
+use std::ffi::c_char;
+
+/// Reads a scene from a folder with images/ and a COLMAP model in sparse/ or sparse/0/, as `colmap image_undistorter`
+/// writes it: text or binary, cameras PINHOLE or SIMPLE_PINHOLE, photographs PNG or JPEG. Paths are in the bytes of the
+/// file system. `near` and `far` are the depth range of every view; (0, 0) takes it from the sparse points.
+///
+/// SKEP_ERR_FILE: the text names the file, the line where there is one, and what would be right.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_scene_read_colmap(
+    folder: *const c_char,
+    near: f64,
+    far: f64,
+    scene_out: *mut *mut skep_scene,
+) -> skep_status {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        let (folder, out) = unsafe { (path(folder, "folder")?, out(scene_out, "scene_out")?) };
+        let range = (near != 0.0 || far != 0.0).then_some(DepthRange { near, far });
+        if let Some(range) = range {
+            range.check("depth range")?;
+        }
+        out.give(skep_scene::new(io::read_scene(folder, range)?));
+        Ok(())
+    })
+}
+
+/// Writes a scene as a folder that COLMAP and skep_scene_read_colmap read: the photographs as PNG files under their
+/// views' names in images/, and a binary model in sparse/.
+///
+/// SKEP_ERR_ARGUMENT: a view whose name does not end in .png, or would lead out of the folder.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_scene_write_colmap(
+    scene: *const skep_scene,
+    folder: *const c_char,
+) -> skep_status {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        let (scene, folder) = unsafe { (get(scene, "scene")?, path(folder, "folder")?) };
+        Ok(io::write_scene(folder, &scene.checked()?)?)
+    })
+}
+
+/// Writes what COLMAP calls a dense folder, less images/ and sparse/ (skep_scene_write_colmap writes those, into the
+/// same folder if it is to be a workspace of COLMAP's): for every view of the result depth maps, normal maps and
+/// consistency graphs in stereo/, raw ("photometric") and validated ("geometric"), previews in preview/; the lists of
+/// images that COLMAP wants in stereo/; and fused.ply with fused.ply.vis when there is a cloud. `scene` is the one the
+/// result was made from. Files are whole or not there.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_result_write_workspace(
+    result: *const skep_result,
+    scene: *const skep_scene,
+    folder: *const c_char,
+) -> skep_status {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        let (result, scene, folder) =
+            unsafe { (get(result, "result")?, get(scene, "scene")?.checked()?, path(folder, "folder")?) };
+        let workspace = Workspace::new(folder);
+        let views = scene.views();
+        for (&index, view) in &result.views {
+            let fits = views
+                .get(index as usize)
+                .filter(|own| own.camera.width == view.width && own.camera.pixels() == view.outcome.len());
+            let Some(own) = fits else {
+                let value = format!("one whose view {index} is missing or of another size");
+                return Err(Failure::argument("scene", value, "the scene the result was made from"));
+            };
+            workspace.write_view(&own.name, &own.camera, view)?;
+        }
+        workspace.write_lists(views.iter().map(|view| view.name.as_str()))?;
+        if let Some(points) = result.cloud() {
+            Workspace::write_cloud(&workspace.cloud(), points)?;
+        }
+        Ok(())
+    })
+}
+
+/// Writes a cloud as binary PLY (x, y, z as floats, normals, colours), and the views of each point beside it in
+/// FILE.vis, as COLMAP does.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_cloud_write_ply(cloud: *const skep_cloud, file: *const c_char) -> skep_status {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        let (cloud, file) = unsafe { (get(cloud, "cloud")?, path(file, "file")?) };
+        Ok(Workspace::write_cloud(file, &cloud.points)?)
+    })
+}
+
+/// Refuses a map of no pixels, which no file has.
+fn check_size(width: u32, height: u32) -> Result<(u32, u32), Failure> {
+    for (name, side) in [("width", width), ("height", height)] {
+        if side == 0 || side > Camera::MAX_SIDE {
+            return Err(Failure::argument(name, side, format!("1 to {} pixels", Camera::MAX_SIDE)));
+        }
+    }
+    Ok((width, height))
+}
+
+/// Writes a depth map in COLMAP's layout: width floats a row, `stride_bytes` from row to row.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_write_depth_map(
+    file: *const c_char,
+    depth: *const f32,
+    width: u32,
+    height: u32,
+    stride_bytes: usize,
+) -> skep_status {
+    guard(|| {
+        let size = check_size(width, height)?;
+        // SAFETY: as the header demands of the caller.
+        let (file, depth) = unsafe { (path(file, "file")?, maps::read(depth, size, stride_bytes, "depth")?) };
+        Ok(io::write_depth_map(file, width, height, &depth)?)
+    })
+}
+
+/// Writes a normal map in COLMAP's layout: x, y, z of each pixel, 3 * width floats a row, `stride_bytes` from row to row.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_write_normal_map(
+    file: *const c_char,
+    normal: *const f32,
+    width: u32,
+    height: u32,
+    stride_bytes: usize,
+) -> skep_status {
+    guard(|| {
+        let size = check_size(width, height)?;
+        let normal = normal.cast::<[f32; 3]>();
+        // SAFETY: as the header demands of the caller.
+        let (file, normal) =
+            unsafe { (path(file, "file")?, maps::read(normal, size, stride_bytes, "normal")?) };
+        Ok(io::write_normal_map(file, width, height, &normal)?)
+    })
+}
+
+/// Writes a consistency graph in COLMAP's layout: `counts` holds the number of views of each of the width * height
+/// pixels, `views` their numbers, pixel after pixel, `view_total` in all. Pixels without any are left out of the file.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_write_consistency_graph(
+    file: *const c_char,
+    width: u32,
+    height: u32,
+    counts: *const u32,
+    views: *const u32,
+    view_total: usize,
+) -> skep_status {
+    guard(|| {
+        check_size(width, height)?;
+        let pixels = width as usize * height as usize;
+        // SAFETY: as the header demands of the caller.
+        let (file, counts, views) = unsafe {
+            (path(file, "file")?, slice(counts, pixels, "counts")?, slice(views, view_total, "views")?)
+        };
+        let mut ends = Vec::with_capacity(pixels);
+        let sum = counts.iter().fold(0usize, |sum, &count| {
+            ends.push(sum.saturating_add(count as usize));
+            sum.saturating_add(count as usize)
+        });
+        if sum != view_total {
+            return Err(Failure::argument("view_total", view_total, format!("the sum of counts, {sum}")));
+        }
+        Ok(io::write_consistency_graph(file, width, height, |pixel| {
+            views[ends[pixel] - counts[pixel] as usize..ends[pixel]].iter().copied()
+        })?)
+    })
+}
+
+/// Reads a depth map in COLMAP's layout, row after row without gaps. `width_out` and `height_out` receive its size; with
+/// `depth` NULL nothing else happens, else `capacity` is the number of floats it has room for, at least width * height.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_read_depth_map(
+    file: *const c_char,
+    depth: *mut f32,
+    capacity: usize,
+    width_out: *mut u32,
+    height_out: *mut u32,
+) -> skep_status {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        unsafe {
+            let (width, height) = (out(width_out, "width_out")?, out(height_out, "height_out")?);
+            let map = io::read_depth_map(path(file, "file")?)?;
+            wanted(depth, capacity, map.values.len(), "depth")?
+                .into_iter()
+                .for_each(|out| out.set(&map.values));
+            width.set(map.width);
+            height.set(map.height);
+        }
+        Ok(())
+    })
+}
+
+/// Reads a normal map in COLMAP's layout, x, y, z of each pixel, row after row without gaps; see skep_read_depth_map.
+/// `capacity` is the number of floats, at least 3 * width * height.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_read_normal_map(
+    file: *const c_char,
+    normal: *mut f32,
+    capacity: usize,
+    width_out: *mut u32,
+    height_out: *mut u32,
+) -> skep_status {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        unsafe {
+            let (width, height) = (out(width_out, "width_out")?, out(height_out, "height_out")?);
+            let map = io::read_normal_map(path(file, "file")?)?;
+            let values = map.values.as_flattened();
+            wanted(normal, capacity, values.len(), "normal")?.into_iter().for_each(|out| out.set(values));
+            width.set(map.width);
+            height.set(map.height);
+        }
+        Ok(())
+    })
+}
+
+/// Reads a consistency graph in COLMAP's layout: the number of views of each pixel into `counts` (room for
+/// `count_capacity`, at least width * height) and their numbers, pixel after pixel, into `views` (room for
+/// `view_capacity`). `view_total_out` receives the number of those; `counts` and `views` may be NULL to only ask.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_read_consistency_graph(
+    file: *const c_char,
+    counts: *mut u32,
+    count_capacity: usize,
+    views: *mut u32,
+    view_capacity: usize,
+    width_out: *mut u32,
+    height_out: *mut u32,
+    view_total_out: *mut usize,
+) -> skep_status {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        unsafe {
+            let (width, height) = (out(width_out, "width_out")?, out(height_out, "height_out")?);
+            let graph = io::read_consistency_graph(path(file, "file")?)?;
+            let place = |pixel: &[u32; 2]| pixel[1] as usize * graph.width as usize + pixel[0] as usize;
+            let mut order: Vec<usize> = (0..graph.pixels.len()).collect();
+            order.sort_by_key(|&entry| place(&graph.pixels[entry]));
+            let mut per_pixel = vec![0u32; graph.width as usize * graph.height as usize];
+            let mut all = Vec::new();
+            for entry in order {
+                per_pixel[place(&graph.pixels[entry])] += graph.views.get(entry).len() as u32;
+                all.extend_from_slice(graph.views.get(entry));
+            }
+            let counts = wanted(counts, count_capacity, per_pixel.len(), "counts")?;
+            give_list(&all, views, view_capacity, view_total_out, "views")?;
+            counts.into_iter().for_each(|out| out.set(&per_pixel));
+            width.set(graph.width);
+            height.set(graph.height);
+        }
+        Ok(())
+    })
+}

@@ -1,0 +1,186 @@
+//! Images in C's buffers: 8-bit, 16-bit and float, grey and colour, with strides.
+
+use super::status::{Failure, SKEP_ERR_NULL};
+use crate::camera::Camera;
+use crate::image::Picture;
+use std::ffi::c_void;
+
+/// Grey. An image's format is a layout, of 8 bits a channel, plus a depth when it is another: SKEP_FORMAT_BGR is 8-bit
+/// BGR, SKEP_FORMAT_BGR + SKEP_FORMAT_16 is 16-bit BGR.
+pub const SKEP_FORMAT_GREY: u32 = 0;
+/// Red, green, blue.
+pub const SKEP_FORMAT_RGB: u32 = 1;
+/// Blue, green, red, as OpenCV has it.
+pub const SKEP_FORMAT_BGR: u32 = 2;
+/// Red, green, blue, and a fourth channel that is ignored.
+pub const SKEP_FORMAT_RGBA: u32 = 3;
+/// Blue, green, red, and a fourth channel that is ignored.
+pub const SKEP_FORMAT_BGRA: u32 = 4;
+/// Added to a layout: uint16_t in the machine's byte order, 0 to 65535.
+pub const SKEP_FORMAT_16: u32 = 16;
+/// Added to a layout: float, 0 to 1; values beyond are clamped.
+pub const SKEP_FORMAT_FLOAT: u32 = 32;
+
+/// Pixels in the caller's memory, which is only read, and only during the call. This struct never changes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct skep_image {
+    /// The top-left pixel. 16-bit and float pixels need no alignment.
+    pub data: *const c_void,
+    /// Pixels of a row, 1 to 32768.
+    pub width: u32,
+    /// Rows, 1 to 32768.
+    pub height: u32,
+    /// Bytes from a row to the next, at least those of a row's pixels; bytes between rows are not touched.
+    pub stride_bytes: usize,
+    /// Layout plus depth, from the SKEP_FORMAT_ values.
+    pub format: u32,
+}
+
+/// How a format's channels lie: how many, and where red, green and blue are.
+struct Layout {
+    channels: usize,
+    rgb: Option<[usize; 3]>,
+}
+
+#[derive(Clone, Copy)]
+enum Depth {
+    Byte,
+    Short,
+    Float,
+}
+
+impl Depth {
+    fn bytes(self) -> usize {
+        match self {
+            Depth::Byte => 1,
+            Depth::Short => 2,
+            Depth::Float => 4,
+        }
+    }
+
+    /// A channel's value, rounded to 8 bits; `None` for what is not a number.
+    fn read(self, bytes: &[u8]) -> Option<u8> {
+        match self {
+            Depth::Byte => Some(bytes[0]),
+            Depth::Short => {
+                let value = u16::from_ne_bytes([bytes[0], bytes[1]]);
+                Some(((u32::from(value) + 128) / 257) as u8)
+            }
+            Depth::Float => {
+                let value = f32::from_ne_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
+                (!value.is_nan()).then(|| (value.clamp(0.0, 1.0) * 255.0).round() as u8)
+            }
+        }
+    }
+}
+
+fn format(format: u32) -> Result<(Layout, Depth), Failure> {
+    let layout = match format % 16 {
+        SKEP_FORMAT_GREY => Some(Layout { channels: 1, rgb: None }),
+        SKEP_FORMAT_RGB => Some(Layout { channels: 3, rgb: Some([0, 1, 2]) }),
+        SKEP_FORMAT_BGR => Some(Layout { channels: 3, rgb: Some([2, 1, 0]) }),
+        SKEP_FORMAT_RGBA => Some(Layout { channels: 4, rgb: Some([0, 1, 2]) }),
+        SKEP_FORMAT_BGRA => Some(Layout { channels: 4, rgb: Some([2, 1, 0]) }),
+        _ => None,
+    };
+    let depth = match format / 16 * 16 {
+        0 => Some(Depth::Byte),
+        SKEP_FORMAT_16 => Some(Depth::Short),
+        SKEP_FORMAT_FLOAT => Some(Depth::Float),
+        _ => None,
+    };
+    layout.zip(depth).ok_or_else(|| {
+        Failure::argument(
+            "image.format",
+            format,
+            "a SKEP_FORMAT_ layout, plus SKEP_FORMAT_16 or SKEP_FORMAT_FLOAT",
+        )
+    })
+}
+
+/// The bytes of an image's rows, each without what lies between rows.
+///
+/// # Safety
+/// `data` is NULL or points to `height` rows of `row_bytes` readable bytes, `stride_bytes` apart, that stay as they are
+/// for `'a`.
+pub unsafe fn rows<'a>(
+    data: *const c_void,
+    row_bytes: usize,
+    height: u32,
+    stride_bytes: usize,
+    name: &str,
+) -> Result<impl Iterator<Item = &'a [u8]> + Clone + use<'a>, Failure> {
+    check_rows(data, row_bytes, height, stride_bytes, name)?;
+    let data = data.cast::<u8>();
+    Ok((0..height as usize).map(move |row| {
+        // SAFETY: the caller promised the bytes; `check_rows` that offset and length fit into an allocation.
+        unsafe { std::slice::from_raw_parts(data.add(row * stride_bytes), row_bytes) }
+    }))
+}
+
+/// Refuses NULL, rows that overlap, and buffers that no memory can hold.
+pub fn check_rows(
+    data: *const c_void,
+    row_bytes: usize,
+    height: u32,
+    stride_bytes: usize,
+    name: &str,
+) -> Result<(), Failure> {
+    if data.is_null() {
+        return Err(Failure::new(SKEP_ERR_NULL, format!("{name} is NULL; expected {height} rows")));
+    }
+    if stride_bytes < row_bytes {
+        let expected = format!("at least {row_bytes}, the bytes of a row");
+        return Err(Failure::argument(&format!("stride_bytes of {name}"), stride_bytes, expected));
+    }
+    if stride_bytes.checked_mul(height as usize).is_none_or(|bytes| bytes > isize::MAX as usize) {
+        return Err(Failure::argument(
+            &format!("stride_bytes of {name}"),
+            stride_bytes,
+            "what fits into memory",
+        ));
+    }
+    Ok(())
+}
+
+impl skep_image {
+    /// A copy of the image.
+    ///
+    /// # Safety
+    /// `data` is NULL or points to an image as the fields describe it.
+    pub unsafe fn picture(&self) -> Result<Picture, Failure> {
+        let (layout, depth) = format(self.format)?;
+        for (name, side) in [("image.width", self.width), ("image.height", self.height)] {
+            if side == 0 || side > Camera::MAX_SIDE {
+                return Err(Failure::argument(name, side, format!("1 to {} pixels", Camera::MAX_SIDE)));
+            }
+        }
+        let pixel_bytes = layout.channels * depth.bytes();
+        let row_bytes = self.width as usize * pixel_bytes;
+        // SAFETY: as promised by the caller.
+        let rows = unsafe { rows(self.data, row_bytes, self.height, self.stride_bytes, "image.data") }?;
+        let pixels = rows.enumerate().flat_map(|(row, bytes)| {
+            bytes.chunks_exact(pixel_bytes).enumerate().map(move |(column, pixel)| (column, row, pixel))
+        });
+        let channel = |(column, row, pixel): (usize, usize, &[u8]), channel: usize| {
+            depth.read(&pixel[channel * depth.bytes()..]).ok_or_else(|| {
+                let name = format!("image.data at column {column}, row {row}");
+                Failure::argument(&name, "not a number", "numbers from 0 to 1")
+            })
+        };
+        let (width, height) = (self.width, self.height);
+        Ok(match layout.rgb {
+            None => {
+                let grey: Result<Vec<u8>, Failure> = pixels.map(|pixel| channel(pixel, 0)).collect();
+                Picture::from_grey(width, height, grey?)?
+            }
+            Some([red, green, blue]) => {
+                let colour: Result<Vec<[u8; 3]>, Failure> = pixels
+                    .map(|pixel| Ok([channel(pixel, red)?, channel(pixel, green)?, channel(pixel, blue)?]))
+                    .collect();
+                Picture::from_rgb(width, height, colour?)?
+            }
+        })
+    }
+}

@@ -1,0 +1,288 @@
+//! The kernels in C: plane-induced homographies and patch correlation, alone and in batches.
+
+use super::camera::skep_camera;
+use super::image::skep_image;
+use super::pointers::{destroy, get, out, out_slice, slice};
+use super::status::{Failure, guard, skep_status};
+use crate::camera::{Plane, plane_homography};
+use crate::image::PackedImage;
+use crate::kernels::{MAX_COST, PatchHomography, ReferencePatch, Window, patch_cost};
+use crate::simd::{Level, Simd, Task, dispatch};
+use glam::{DVec2, DVec3, Vec3};
+
+/// A grey image in the layout the kernels sample. Never changes: may be used from several threads at once.
+pub struct skep_samples {
+    image: PackedImage,
+}
+
+/// Where patches are sampled and how samples are weighted. Never changes: may be used from several threads at once.
+pub struct skep_window {
+    window: Window,
+    level: Level,
+}
+
+/// A plane in the reference camera's frame: normal . X = -distance, with a unit normal that faces the camera and a
+/// distance above 0. This struct never changes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct skep_plane {
+    /// Unit normal.
+    pub normal: [f64; 3],
+    /// Distance from the camera's centre.
+    pub distance: f64,
+}
+
+/// The plane with this unit normal through the point at `depth` behind a pixel, which need not be whole.
+///
+/// Stateless, like all kernels here: any number of threads, no allocation.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_plane_through(
+    camera: *const skep_camera,
+    x: f64,
+    y: f64,
+    depth: f64,
+    normal: *const f64,
+    plane_out: *mut skep_plane,
+) -> skep_status {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        let (camera, normal, out) =
+            unsafe { (get(camera, "camera")?, slice(normal, 3, "normal")?, out(plane_out, "plane_out")?) };
+        let camera = camera.sized((1, 1), "camera")?;
+        let plane = Plane::at(&camera, DVec2::new(x, y), depth, DVec3::new(normal[0], normal[1], normal[2]));
+        let plane = skep_plane { normal: plane.normal.to_array(), distance: plane.distance };
+        plane.checked("plane")?;
+        out.set(plane);
+        Ok(())
+    })
+}
+
+impl skep_plane {
+    fn checked(&self, name: &str) -> Result<Plane, Failure> {
+        let normal = DVec3::from_array(self.normal);
+        if !((normal.length() - 1.0).abs() < 1e-4) {
+            return Err(Failure::argument(&format!("{name}.normal"), normal, "a unit vector"));
+        }
+        if !(self.distance > 0.0 && self.distance.is_finite()) {
+            let expected = "a finite distance above 0: the plane before the camera, its normal facing it";
+            return Err(Failure::argument(&format!("{name}.distance"), self.distance, expected));
+        }
+        Ok(Plane { normal, distance: self.distance })
+    }
+}
+
+/// The homographies that planes induce from pixels of one camera to pixels of another, H = K' (R - t n^T / D) K^-1
+/// (equation 2 of the paper): 9 doubles each, row by row, so that (x', y', 1) ~ H (x, y, 1). `homographies` has room
+/// for 9 * count doubles.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_plane_homographies(
+    reference: *const skep_camera,
+    source: *const skep_camera,
+    planes: *const skep_plane,
+    count: usize,
+    homographies: *mut f64,
+) -> skep_status {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        let (reference, source, planes) = unsafe {
+            (get(reference, "reference")?, get(source, "source")?, slice(planes, count, "planes")?)
+        };
+        let reference = reference.sized((1, 1), "reference")?;
+        let source = source.sized((1, 1), "source")?;
+        for (index, plane) in planes.iter().enumerate() {
+            check_item(index, |name| plane.checked(name).map(drop), "planes")?;
+        }
+        if count == 0 {
+            return Ok(());
+        }
+        let homographies = homographies.cast::<[f64; 9]>();
+        // SAFETY: as the header demands of the caller.
+        drop(unsafe { out_slice(homographies, count, count, "homographies") }?);
+        for (index, plane) in planes.iter().enumerate() {
+            let plane = Plane { normal: DVec3::from_array(plane.normal), distance: plane.distance };
+            let homography = plane_homography(&reference, &source, &plane);
+            // SAFETY: checked above; there is room for `count`.
+            unsafe { homographies.add(index).write(homography.transpose().to_cols_array()) }
+        }
+        Ok(())
+    })
+}
+
+/// Runs a check of one item of a batch; the name is only made when it fails.
+fn check_item(index: usize, check: impl Fn(&str) -> Result<(), Failure>, list: &str) -> Result<(), Failure> {
+    check("").or_else(|_| check(&format!("{list}[{index}]")))
+}
+
+/// Copies an image into the layout the kernels sample; colours become grey as in skep_scene_add_view.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_samples_create(
+    image: *const skep_image,
+    samples_out: *mut *mut skep_samples,
+) -> skep_status {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        let (image, out) = unsafe { (get(image, "image")?, out(samples_out, "samples_out")?) };
+        // SAFETY: as the header demands of the caller.
+        out.give(skep_samples { image: PackedImage::new(&unsafe { image.picture() }?) });
+        Ok(())
+    })
+}
+
+/// Destroys samples; NULL is ignored.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_samples_destroy(samples: *mut skep_samples) {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        unsafe { destroy(samples) };
+        Ok(())
+    });
+}
+
+/// Makes a square window of half side `radius` (1 to 16), sampled every `step` pixels (1 to 8). A sample weighs
+/// exp(-r^2 / (2 spatial_sigma^2) - dI^2 / (2 colour_sigma^2)), with r its distance from the centre in pixels and dI its
+/// difference in grey from it, of [0, 1]; INFINITY for both sigmas weighs all samples alike. `min_variance`: weighted
+/// variance, of grey in [0, 1], under which a patch has no texture; 1e-5 suits photographs.
+///
+/// The instruction set is the one skep_backend_name tells when the window is made.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_window_create(
+    radius: u32,
+    step: u32,
+    spatial_sigma: f64,
+    colour_sigma: f64,
+    min_variance: f64,
+    window_out: *mut *mut skep_window,
+) -> skep_status {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        let out = unsafe { out(window_out, "window_out") }?;
+        if !(1..=Window::MAX_RADIUS).contains(&radius) {
+            return Err(Failure::argument("radius", radius, format!("1 to {}", Window::MAX_RADIUS)));
+        }
+        if !(1..=8).contains(&step) {
+            return Err(Failure::argument("step", step, "1 to 8"));
+        }
+        for (name, sigma) in [("spatial_sigma", spatial_sigma), ("colour_sigma", colour_sigma)] {
+            if !(sigma >= 1e-3) {
+                return Err(Failure::argument(name, sigma, "a number of at least 0.001, or INFINITY"));
+            }
+        }
+        if !(0.0..=1.0).contains(&min_variance) {
+            return Err(Failure::argument("min_variance", min_variance, "a number from 0 to 1"));
+        }
+        let window = Window::new(radius, step, spatial_sigma, colour_sigma, min_variance);
+        out.give(skep_window { window, level: Level::detect() });
+        Ok(())
+    })
+}
+
+/// Destroys a window; NULL is ignored.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_window_destroy(window: *mut skep_window) {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        unsafe { destroy(window) };
+        Ok(())
+    });
+}
+
+/// Normalised cross-correlations of patches of the reference with their images in a source view: `pixels` holds x, y of
+/// each patch's centre in the reference (2 * count), `homographies` the way of each from reference to source pixels (9
+/// doubles each, row by row), `ncc` has room for count floats. -1 to 1; -1 also where either side has no texture. Samples
+/// outside the reference weigh nothing, those outside the source repeat its border.
+///
+/// Patches that follow each other at the same pixel share the reference's side: sort them so. Stateless: any number of
+/// threads, no allocation.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_patch_ncc(
+    window: *const skep_window,
+    reference: *const skep_samples,
+    source: *const skep_samples,
+    pixels: *const u32,
+    homographies: *const f64,
+    count: usize,
+    ncc: *mut f32,
+) -> skep_status {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        let (window, reference, source, pixels, homographies) = unsafe {
+            (
+                get(window, "window")?,
+                &get(reference, "reference")?.image,
+                &get(source, "source")?.image,
+                slice(pixels.cast::<[u32; 2]>(), count, "pixels")?,
+                slice(homographies.cast::<[f64; 9]>(), count, "homographies")?,
+            )
+        };
+        for (index, &[x, y]) in pixels.iter().enumerate() {
+            if x as usize >= reference.width || y as usize >= reference.height {
+                let expected = format!("inside {} x {} pixels", reference.width, reference.height);
+                let value = format!("({x}, {y})");
+                return Err(Failure::argument(&format!("pixels[{index}]"), value, expected));
+            }
+        }
+        for (index, homography) in homographies.iter().enumerate() {
+            if !homography.iter().all(|entry| entry.is_finite()) {
+                let value = format!("{homography:?}");
+                return Err(Failure::argument(&format!("homographies[{index}]"), value, "finite numbers"));
+            }
+        }
+        // SAFETY: as the header demands of the caller.
+        drop(unsafe { out_slice(ncc, count, count, "ncc") }?);
+        if count == 0 {
+            return Ok(());
+        }
+        // SAFETY: checked above; any bits are a float, and the batch only writes.
+        let ncc = unsafe { std::slice::from_raw_parts_mut(ncc, count) };
+        dispatch(
+            window.level,
+            Batch { window: &window.window, reference, source, pixels, homographies, ncc },
+        );
+        Ok(())
+    })
+}
+
+/// A batch of patches.
+struct Batch<'a> {
+    window: &'a Window,
+    reference: &'a PackedImage,
+    source: &'a PackedImage,
+    pixels: &'a [[u32; 2]],
+    homographies: &'a [[f64; 9]],
+    ncc: &'a mut [f32],
+}
+
+impl Task for Batch<'_> {
+    type Output = ();
+
+    fn run<S: Simd>(self, simd: S) {
+        let Batch { window, reference, source, pixels, homographies, ncc } = self;
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut patch = ReferencePatch::new(window);
+                let mut sampled = None;
+                for ((pixel, homography), ncc) in pixels.iter().zip(homographies).zip(ncc) {
+                    let [x, y] = *pixel;
+                    if sampled != Some([x, y]) {
+                        patch.sample(simd, window, reference, x as usize, y as usize);
+                        sampled = Some([x, y]);
+                    }
+                    let about = about_pixel(homography, f64::from(x), f64::from(y));
+                    let cost = patch_cost(simd, window, &patch, source, &about);
+                    *ncc = 1.0 - cost.min(MAX_COST);
+                }
+            },
+        )
+    }
+}
+
+/// A homography about a pixel. Scaled so that the centre's third coordinate is 1, which f32 holds best.
+#[inline(always)]
+fn about_pixel(h: &[f64; 9], x: f64, y: f64) -> PatchHomography {
+    let column = |index: usize| DVec3::new(h[index], h[index + 3], h[index + 6]);
+    let centre = column(0) * x + column(1) * y + column(2);
+    let scale = 1.0 / centre.z;
+    let scaled = |vector: DVec3| -> Vec3 { (vector * scale).as_vec3() };
+    PatchHomography { centre: scaled(centre), along_x: scaled(column(0)), along_y: scaled(column(1)) }
+}

@@ -1,0 +1,25 @@
+//! The C ABI: one file for each section of `include/skep.h`, which is generated from here and is the manual.
+//!
+//! Names are C's, so that what a C program calls is found by searching for it. Every entry runs under
+//! [`status::guard`]: a failure becomes a status and a text, a panic does not leave the library, and outputs are
+//! written only after everything that can fail has been done.
+
+#![allow(unsafe_code, non_camel_case_types)]
+// What callers must uphold is said once, at the head of the header, in C's words.
+#![allow(clippy::missing_safety_doc)]
+
+mod camera;
+mod cloud;
+mod files;
+mod fusion;
+mod image;
+mod kernels;
+mod maps;
+mod options;
+mod pointers;
+mod progress;
+mod result;
+mod scene;
+mod state;
+mod status;
+mod steps;
