@@ -1,7 +1,9 @@
 //! Geometric consistency check (section 5.6 of the paper): a solution is validated when enough of its source views found
 //! the same surface.
 
+use crate::error::{Error, Result};
 use crate::options::Options;
+use crate::progress::Cancelled;
 use crate::state::{Solution, ViewState};
 use crate::views::{Reference, Source};
 use glam::Vec3;
@@ -64,12 +66,16 @@ impl ConsistencyRules {
 
 /// Checks every solution of a reference view against the sources of its view set; `sources` are their states in the
 /// order of the reference's list, `None` of one that cannot speak. Gives the number of consistent sources and whether the solution is validated.
+///
+/// # Errors
+/// [`Error::Cancelled`].
 pub fn check(
     reference: &Reference,
     state: &ViewState,
     sources: &[Option<&ViewState>],
     rules: &ConsistencyRules,
-) -> Vec<(u8, bool)> {
+    cancelled: Cancelled,
+) -> Result<Vec<(u8, bool)>> {
     let width = reference.image.width;
     let judge = |(pixel, solution): (usize, &Solution)| {
         if solution.depth <= 0.0 {
@@ -88,8 +94,21 @@ pub fn check(
         }
         (consistent.min(255) as u8, rules.validates(consistent, speaking))
     };
-    state.solutions.par_iter().enumerate().with_min_len(1024).map(judge).collect()
+    let mut verdicts = vec![(0, false); state.solutions.len()];
+    let bands = verdicts.par_chunks_mut(BAND).zip(state.solutions.par_chunks(BAND)).enumerate();
+    bands.try_for_each(|(band, (verdicts, solutions))| {
+        if cancelled() {
+            return Err(Error::Cancelled);
+        }
+        let pixels = (band * BAND..).zip(solutions).map(judge);
+        verdicts.iter_mut().zip(pixels).for_each(|(verdict, found)| *verdict = found);
+        Ok(())
+    })?;
+    Ok(verdicts)
 }
+
+/// Pixels judged at once, between two looks whether to go on.
+const BAND: usize = 1 << 12;
 
 /// What one source view says; one that has the point outside its image abstains.
 fn verdict(
@@ -181,7 +200,7 @@ mod tests {
         }
         let sources: Vec<Option<&ViewState>> = states[1..].iter().map(Some).collect();
         let rules = ConsistencyRules::new(&abstaining(occluders_abstain));
-        let verdicts = check(&world.reference(), &states[0], &sources, &rules);
+        let verdicts = check(&world.reference(), &states[0], &sources, &rules, &|| false).unwrap();
         assert_eq!(verdicts.len(), states[0].solutions.len());
         verdicts[14 * 36 + 18]
     }
@@ -212,7 +231,7 @@ mod tests {
         let mut verdicts = |sets: ViewSets| {
             states[0].sets = sets;
             let sources: Vec<Option<&ViewState>> = states[1..].iter().map(Some).collect();
-            check(&world.reference(), &states[0], &sources, &rules)
+            check(&world.reference(), &states[0], &sources, &rules, &|| false).unwrap()
         };
         let middle = 14 * 36 + 18;
         assert_eq!(verdicts(one)[middle], (1, false));
@@ -230,6 +249,9 @@ mod tests {
         states[0].solutions[14 * 36 + 18].depth = 0.0;
         let sources: Vec<Option<&ViewState>> = states[1..].iter().map(Some).collect();
         let rules = ConsistencyRules::new(&abstaining(true));
-        assert_eq!(check(&world.reference(), &states[0], &sources, &rules)[14 * 36 + 18], (0, false));
+        assert_eq!(
+            check(&world.reference(), &states[0], &sources, &rules, &|| false).unwrap()[14 * 36 + 18],
+            (0, false)
+        );
     }
 }

@@ -51,6 +51,9 @@ pub fn ignore_progress(_: &Progress) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
+/// Asked now and then by whatever takes longer than a moment, from any thread; `true` cancels it.
+pub(crate) type Cancelled<'a> = &'a (dyn Fn() -> bool + Sync);
+
 /// Counts the work of a run and tells the hook.
 pub(crate) struct Tracker<'a> {
     hook: Hook<'a>,

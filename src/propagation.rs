@@ -3,6 +3,8 @@
 
 use crate::ambc::{MIN_FACING, Offer};
 use crate::camera::Camera;
+use crate::error::{Error, Result};
+use crate::progress::Cancelled;
 use crate::scene::DepthRange;
 use crate::state::{Solution, ViewState};
 use glam::{DVec2, DVec3};
@@ -21,21 +23,32 @@ pub struct Giver<'a> {
 
 /// The offers to the pixels of a target view that are not validated: for each the one of lowest cost among all
 /// solutions that project there and agree with at least one source view. The order of `givers` does not matter.
-pub fn offers(camera: &Camera, state: &ViewState, range: DepthRange, givers: &[Giver]) -> Vec<Offer> {
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub fn offers(
+    camera: &Camera,
+    state: &ViewState,
+    range: DepthRange,
+    givers: &[Giver],
+    cancelled: Cancelled,
+) -> Result<Vec<Offer>> {
     let nothing = || vec![Ranked::default(); camera.pixels()];
     let from_one = |giver: &Giver| {
         let mut offers = nothing();
-        give(camera, state, range, giver, &mut offers);
-        offers
+        give(camera, state, range, giver, &mut offers, cancelled).then_some(offers)
     };
     let merge = |mut ours: Vec<Ranked>, theirs: Vec<Ranked>| {
         for (ours, theirs) in ours.iter_mut().zip(&theirs) {
             ours.keep_better(theirs);
         }
-        ours
+        Some(ours)
     };
-    let ranked = givers.par_iter().map(from_one).reduce_with(merge);
-    ranked.unwrap_or_else(nothing).into_iter().map(|ranked| ranked.offer).collect()
+    let ranked = match givers.par_iter().map(from_one).try_reduce_with(merge) {
+        Some(ranked) => ranked.ok_or(Error::Cancelled)?,
+        None => nothing(),
+    };
+    Ok(ranked.into_iter().map(|ranked| ranked.offer).collect())
 }
 
 /// An offer and who makes it.
@@ -58,11 +71,25 @@ impl Ranked {
     }
 }
 
-fn give(camera: &Camera, state: &ViewState, range: DepthRange, giver: &Giver, offers: &mut [Ranked]) {
+/// Pixels between two looks whether to go on.
+const PATIENCE: usize = 1 << 16;
+
+/// Makes one view's offers; whether it was not cancelled.
+fn give(
+    camera: &Camera,
+    state: &ViewState,
+    range: DepthRange,
+    giver: &Giver,
+    offers: &mut [Ranked],
+    cancelled: Cancelled,
+) -> bool {
     let rotation = camera.rotation * giver.camera.rotation.transpose();
     let translation = camera.translation - rotation * giver.camera.translation;
     let width = giver.camera.width as usize;
     for (pixel, solution) in giver.state.solutions.iter().enumerate() {
+        if pixel % PATIENCE == 0 && cancelled() {
+            return false;
+        }
         if solution.depth <= 0.0 || solution.consistent == 0 {
             continue;
         }
@@ -76,6 +103,7 @@ fn give(camera: &Camera, state: &ViewState, range: DepthRange, giver: &Giver, of
             offers[target].keep_better(&Ranked { offer, view: giver.view });
         }
     }
+    true
 }
 
 fn is_settled(solution: &Solution) -> bool {
@@ -110,7 +138,7 @@ mod tests {
     fn offered(world: &World, target: &ViewState, givers: &[(usize, &ViewState)]) -> Vec<Offer> {
         let givers: Vec<Giver> =
             givers.iter().map(|&(view, state)| Giver { view, camera: &world.cameras[view], state }).collect();
-        let offers = offers(&world.cameras[0], target, RANGE, &givers);
+        let offers = offers(&world.cameras[0], target, RANGE, &givers, &|| false).unwrap();
         assert_eq!(offers.len(), target.solutions.len());
         offers
     }
@@ -205,7 +233,7 @@ mod tests {
         let (world, target, mut givers) = target_and_givers();
         let short = DepthRange { near: 1.0, far: 3.0 };
         let giver = Giver { view: 1, camera: &world.cameras[1], state: &givers[0] };
-        assert_eq!(count(&offers(&world.cameras[0], &target, short, &[giver])), 0);
+        assert_eq!(count(&offers(&world.cameras[0], &target, short, &[giver], &|| false).unwrap()), 0);
         givers[0].solutions.iter_mut().for_each(|solution| solution.normal = -solution.normal);
         assert_eq!(count(&offered(&world, &target, &[(1, &givers[0])])), 0);
     }

@@ -206,6 +206,28 @@ fn views_within_the_band_of_angles_become_sources_smallest_angle_first() {
 }
 
 #[test]
+fn sources_given_by_hand_are_taken_as_they_are() {
+    let views = |sources: Option<Vec<u32>>| -> Vec<View> {
+        let view = |(index, camera): (usize, &Camera)| View {
+            name: format!("view{index}"),
+            picture: blank(),
+            camera: *camera,
+            mask: None,
+            depth_range: Some(RANGE),
+            sources: sources.clone().filter(|_| index == 0),
+        };
+        around(&[0.0, 20.0, 60.0, 15.0]).iter().enumerate().map(view).collect()
+    };
+    let found = source_lists(&Scene::new(views(Some(vec![2, 1])), vec![]).unwrap(), &ten_to_thirty());
+    // 60 degrees lie far outside the band, and the other views are chosen as ever.
+    assert_eq!((&found.lists[0][..], &found.lists[3][..]), (&[2, 1][..], &[0][..]));
+    for wrong in [vec![4], vec![0], vec![1, 1]] {
+        let error = Scene::new(views(Some(wrong)), vec![]).unwrap_err().to_string();
+        assert!(error.contains("views[0] (view0).sources["), "{error}");
+    }
+}
+
+#[test]
 fn the_angle_of_two_views_is_the_75th_percentile_at_their_shared_points() {
     let camera = |x: f64| looking_at(DVec3::new(x, 0.0, 0.0), DVec3::new(x, 0.0, 1.0), (41, 31), 40.0);
     let cameras = [camera(-0.5), camera(0.5)];

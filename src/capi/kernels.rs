@@ -60,7 +60,8 @@ pub unsafe extern "C" fn skep_plane_through(
 impl skep_plane {
     fn checked(&self, name: &str) -> Result<Plane, Failure> {
         let normal = DVec3::from_array(self.normal);
-        if !((normal.length() - 1.0).abs() < 1e-4) {
+        let is_unit = (normal.length() - 1.0).abs() < 1e-4;
+        if !is_unit {
             return Err(Failure::argument(&format!("{name}.normal"), normal, "a unit vector"));
         }
         if !(self.distance > 0.0 && self.distance.is_finite()) {
@@ -97,7 +98,7 @@ pub unsafe extern "C" fn skep_plane_homographies(
         }
         let homographies = homographies.cast::<[f64; 9]>();
         // SAFETY: as the header demands of the caller.
-        drop(unsafe { out_slice(homographies, count, count, "homographies") }?);
+        let _ = unsafe { out_slice(homographies, count, count, "homographies") }?;
         for (index, plane) in planes.iter().enumerate() {
             let plane = Plane { normal: DVec3::from_array(plane.normal), distance: plane.distance };
             let homography = plane_homography(&reference, &source, &plane);
@@ -163,7 +164,8 @@ pub unsafe extern "C" fn skep_window_create(
             return Err(Failure::argument("step", step, "1 to 8"));
         }
         for (name, sigma) in [("spatial_sigma", spatial_sigma), ("colour_sigma", colour_sigma)] {
-            if !(sigma >= 1e-3) {
+            let usable = sigma >= 1e-3;
+            if !usable {
                 return Err(Failure::argument(name, sigma, "a number of at least 0.001, or INFINITY"));
             }
         }
@@ -228,7 +230,7 @@ pub unsafe extern "C" fn skep_patch_ncc(
             }
         }
         // SAFETY: as the header demands of the caller.
-        drop(unsafe { out_slice(ncc, count, count, "ncc") }?);
+        let _ = unsafe { out_slice(ncc, count, count, "ncc") }?;
         if count == 0 {
             return Ok(());
         }

@@ -18,10 +18,9 @@ pub struct ScaledView {
 }
 
 impl ScaledView {
-    /// All views of a scene, their images halved this many times.
-    pub fn all(scene: &Scene, halvings: u32) -> Vec<ScaledView> {
-        let views = scene.views().iter().enumerate();
-        views.map(|(index, view)| ScaledView::new(view, scene.depth_range(index), halvings)).collect()
+    /// The view of a scene with this index, its image halved this many times.
+    pub fn of(scene: &Scene, index: usize, halvings: u32) -> ScaledView {
+        ScaledView::new(&scene.views()[index], scene.depth_range(index), halvings)
     }
 
     fn new(view: &View, range: DepthRange, halvings: u32) -> ScaledView {

@@ -1,7 +1,7 @@
 //! States as bytes: what a scheduler sends from machine to machine or keeps across a restart.
 
 use super::prepare::Steps;
-use super::state::State;
+use super::state::{State, is_unit};
 use crate::error::{Error, Result};
 use crate::maps::{Counts, CycleRecord};
 use crate::state::{Solution, ViewState};
@@ -106,7 +106,7 @@ impl State {
             let [consistent, validated] = reader.take::<2>().unwrap_or([0; 2]);
             let normal = Vec3::new(x, y, z);
             let usual = depth.is_finite() && depth >= 0.0 && cost >= 0.0 && validated <= 1;
-            if !usual || (depth > 0.0 && !((normal.length() - 1.0).abs() < 1e-2)) {
+            if !usual || (depth > 0.0 && !is_unit(normal)) {
                 let place = format!("column {}, row {}", pixel % width as usize, pixel / width as usize);
                 let value = format!("depth {depth}, normal {normal}, cost {cost} at {place}");
                 return Err(error(value, "what a search can find".into()));

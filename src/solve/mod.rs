@@ -8,7 +8,7 @@ mod schedule;
 mod search;
 mod state;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::fusion::{self, FusionView};
 use crate::maps::{Maps, PointCloud, Reconstruction, ViewResult};
 use crate::options::Options;
@@ -37,7 +37,15 @@ pub fn reconstruct(scene: &Scene, options: &Options, hook: Hook) -> Result<Recon
 const FUSION_SHARE: f64 = 0.03;
 
 fn run(scene: &Scene, options: &Options, hook: Hook) -> Result<Reconstruction> {
-    let steps = Steps::new(scene, options)?;
+    let start = Progress {
+        phase: Phase::Search,
+        reduction: 1,
+        cycle: 0,
+        view: 0,
+        views: scene.views().len(),
+        done: 0.0,
+    };
+    let steps = Steps::new_with(scene, options, &|| hook(&start).is_break())?;
     let work_before = |step| steps.all()[..step].iter().map(|step| step.work(scene)).sum::<u64>();
     let total = work_before(steps.all().len());
     let tracker = Tracker::new(hook, (total as f64 / (1.0 - FUSION_SHARE)) as u64);
@@ -54,9 +62,8 @@ fn run(scene: &Scene, options: &Options, hook: Hook) -> Result<Reconstruction> {
 }
 
 /// One cycle: every view is searched from the states the last cycle left, then all are checked.
-fn cycle(steps: &Steps, step: usize, states: Vec<State>, tracker: &Tracker) -> Result<Vec<State>> {
+fn cycle(steps: &Steps, step: usize, mut states: Vec<State>, tracker: &Tracker) -> Result<Vec<State>> {
     let views = steps.views();
-    let mut states = states;
     for (view, state) in states.iter_mut().enumerate() {
         if steps.is_coarser(state, step) {
             *state = steps.hand_up(step, view, state)?;
@@ -65,17 +72,15 @@ fn cycle(steps: &Steps, step: usize, states: Vec<State>, tracker: &Tracker) -> R
     let before = some(&states);
     let mut searched = Vec::with_capacity(views);
     for view in 0..views {
-        let offers = steps.propagate(step, view, &before)?;
         let progress = steps.all()[step].progress(Phase::Search, view, views);
         let advance = |units| tracker.advance(units, progress);
+        let offers = steps.propagate_with(step, view, &before, &|| advance(0))?;
         searched.push(steps.search_with(step, view, &before, Some(&offers), &advance)?);
     }
     let mut verdicts = Vec::with_capacity(views);
     for view in 0..views {
-        verdicts.push(steps.check(step, view, &some(&searched))?);
-        if tracker.advance(0, steps.all()[step].progress(Phase::Check, view, views)) {
-            return Err(Error::Cancelled);
-        }
+        let progress = steps.all()[step].progress(Phase::Check, view, views);
+        verdicts.push(steps.check_with(step, view, &some(&searched), &|| tracker.advance(0, progress))?);
     }
     for ((view, state), verdicts) in searched.iter_mut().enumerate().zip(&verdicts) {
         steps.mark(view, state, verdicts)?;

@@ -6,9 +6,11 @@ use crate::error::{Error, Result};
 use crate::image::ScaledView;
 use crate::kernels::Window;
 use crate::options::Options;
+use crate::progress::Cancelled;
 use crate::scene::Scene;
 use crate::simd::Level;
 use crate::views::{SourceLists, source_lists};
+use rayon::prelude::*;
 
 /// A run taken apart, for hosts that schedule views themselves, on this machine or on many, or bring maps of their own.
 ///
@@ -39,6 +41,11 @@ impl Steps {
     /// # Errors
     /// An option out of its range, named.
     pub fn new(scene: &Scene, options: &Options) -> Result<Steps> {
+        Steps::new_with(scene, options, &|| false)
+    }
+
+    /// [`Steps::new`] that can be cancelled.
+    pub(super) fn new_with(scene: &Scene, options: &Options, cancelled: Cancelled) -> Result<Steps> {
         options.check()?;
         let window = Window::new(
             options.window_radius,
@@ -53,7 +60,16 @@ impl Steps {
             window,
             sources: source_lists(scene, options),
             steps: Step::all(options),
-            scaled: options.scales.iter().map(|scale| ScaledView::all(scene, scale.halvings)).collect(),
+            scaled: (options.scales.iter())
+                .map(|scale| {
+                    let views = (0..scene.views().len()).into_par_iter();
+                    let of = |view| match cancelled() {
+                        true => Err(Error::Cancelled),
+                        false => Ok(ScaledView::of(scene, view, scale.halvings)),
+                    };
+                    views.map(of).collect()
+                })
+                .collect::<Result<_>>()?,
         })
     }
 

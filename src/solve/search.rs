@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::image::ScaledView;
 use crate::maps::CycleRecord;
 use crate::options::Aggregation;
-use crate::progress::{Hook, Phase, Tracker};
+use crate::progress::{Cancelled, Hook, Phase, Tracker};
 use crate::propagation::{self, Giver};
 use crate::state::{Solution, ViewState};
 use crate::views::{Reference, Source, ViewRules, ViewSets};
@@ -27,6 +27,17 @@ impl Steps {
     /// # Errors
     /// A step or view there is not; states of another scale, scene or view than they stand for, or not yet marked.
     pub fn propagate(&self, step: usize, view: usize, states: &[Option<&State>]) -> Result<Offers> {
+        self.propagate_with(step, view, states, &|| false)
+    }
+
+    /// [`Steps::propagate`] that can be cancelled.
+    pub(super) fn propagate_with(
+        &self,
+        step: usize,
+        view: usize,
+        states: &[Option<&State>],
+        cancelled: Cancelled,
+    ) -> Result<Offers> {
         self.check_states(step, view, states)?;
         let target = states.get(view).copied().flatten();
         let (Some(target), true, true) = (target, self.options.propagation, self.all()[step].cycle > 0)
@@ -43,7 +54,7 @@ impl Steps {
             }
         }
         let ScaledView { camera, range, .. } = self.scaled(step, view);
-        Ok(Offers(propagation::offers(camera, &target.solved, *range, &givers)))
+        Ok(Offers(propagation::offers(camera, &target.solved, *range, &givers, cancelled)?))
     }
 
     /// Searches a view in a step, starting from its own state, helped by what is validated in its sources and by
@@ -151,6 +162,17 @@ impl Steps {
     /// A step or view there is not; states of another scale, scene or view than they stand for, or already marked; no
     /// state of the view itself.
     pub fn check(&self, step: usize, view: usize, states: &[Option<&State>]) -> Result<Verdicts> {
+        self.check_with(step, view, states, &|| false)
+    }
+
+    /// [`Steps::check`] that can be cancelled.
+    pub(super) fn check_with(
+        &self,
+        step: usize,
+        view: usize,
+        states: &[Option<&State>],
+        cancelled: Cancelled,
+    ) -> Result<Verdicts> {
         self.check_states(step, view, states)?;
         let Some(own) = states.get(view).copied().flatten() else {
             return Err(missing(view));
@@ -163,7 +185,7 @@ impl Steps {
             .map(|&source| states[source as usize].map(|state| &state.solved))
             .collect();
         let rules = ConsistencyRules::new(&self.options);
-        Ok(Verdicts(consistency::check(&reference, &own.solved, &sources, &rules)))
+        Ok(Verdicts(consistency::check(&reference, &own.solved, &sources, &rules, cancelled)?))
     }
 
     /// Writes the verdicts of a check into the state they were made for: what is validated guides the next search.

@@ -65,7 +65,7 @@ impl State {
                 return Err(Error::argument(name("depth"), depth, "a finite depth above 0, or 0 for none"));
             }
             if let Some(cost) = own.cost.map(|cost| cost[pixel])
-                && !(cost >= 0.0)
+                && (cost.is_nan() || cost < 0.0)
             {
                 return Err(Error::argument(name("cost"), cost, "a number of at least 0"));
             }
@@ -73,7 +73,7 @@ impl State {
                 continue;
             }
             let ray = camera.ray(glam::DVec2::new(place.0 as f64, place.1 as f64)).as_vec3();
-            if !((normal.length() - 1.0).abs() < 1e-2 && normal.dot(ray) < 0.0) {
+            if !is_unit(normal) || normal.dot(ray) >= 0.0 {
                 let expected = "a unit vector that faces the camera (n . ray < 0)";
                 return Err(Error::argument(name("normal"), normal, expected));
             }
@@ -164,4 +164,9 @@ impl State {
         let (counts, cycles) = (self.counts, self.cycles.clone());
         State { view: self.view, step, marked: true, solved, counts, cycles }
     }
+}
+
+/// Whether a normal is a unit vector as far as files and f32 keep it one.
+pub(super) fn is_unit(normal: Vec3) -> bool {
+    (normal.length() - 1.0).abs() < 1e-2
 }

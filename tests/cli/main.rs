@@ -250,6 +250,10 @@ fn the_embedded_scene_end_to_end() {
             assert_eq!(image::image_dimensions(preview).unwrap(), (WIDTH as u32, HEIGHT as u32));
         }
     }
+    let listed = std::fs::read_to_string(dense.join("stereo/fusion.cfg")).unwrap();
+    assert_eq!(listed.lines().collect::<Vec<_>>(), NAMES, "what COLMAP's fusion reads first");
+    assert!(NAMES.iter().all(|name| dense.join("images").join(name).is_file()));
+    assert!(dense.join("sparse/cameras.txt").is_file());
     let points = check_cloud(&dense.join("fused.ply"));
     assert!(points > 50_000, "{points} points");
     assert_eq!(report["totals"]["points"], points);

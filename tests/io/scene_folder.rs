@@ -3,7 +3,8 @@
 use crate::{assert_refused, model};
 use image::{ImageBuffer, Rgb};
 use skep::DepthRange;
-use skep::io::{ColmapModel, SceneFolder, read_scene};
+use skep::io::{ColmapModel, SceneFolder, read_scene, write_scene};
+use skep::{Scene, View};
 use std::path::Path;
 use tempfile::tempdir;
 
@@ -84,4 +85,38 @@ fn one_view_is_refused() {
     write_pictures(folder.path(), &model);
     model.write_text(&folder.path().join("sparse")).unwrap();
     assert_refused(read_scene(folder.path(), RANGE), &["views is 1", "at least 2"]);
+}
+
+#[test]
+fn a_scene_that_is_written_is_read_back_the_same() {
+    let folder = tempdir().unwrap();
+    write_pictures(folder.path(), &model());
+    model().write_text(&folder.path().join("sparse")).unwrap();
+    let scene = read_scene(folder.path(), None).unwrap();
+    let copy = tempdir().unwrap();
+    write_scene(copy.path(), &scene).unwrap();
+    let again = read_scene(copy.path(), None).unwrap();
+    assert_eq!(again.points(), scene.points());
+    for (again, view) in again.views().iter().zip(scene.views()) {
+        assert_eq!((&again.name, &again.picture), (&view.name, &view.picture));
+        let difference = again.camera.rotation - view.camera.rotation;
+        assert!(difference.to_cols_array().iter().all(|entry| entry.abs() < 1e-12));
+        assert_eq!((again.camera.cx, again.camera.translation), (view.camera.cx, view.camera.translation));
+    }
+}
+
+#[test]
+fn a_view_s_name_that_is_no_file_of_the_folder_is_not_written() {
+    let folder = tempdir().unwrap();
+    write_pictures(folder.path(), &model());
+    model().write_text(&folder.path().join("sparse")).unwrap();
+    let (views, points) = read_scene(folder.path(), None).unwrap().into_parts();
+    for name in ["photograph.jpg", "../outside.png", "/outside.png", "photograph"] {
+        let mut renamed = views.clone();
+        renamed[0] = View { name: name.to_owned(), ..views[0].clone() };
+        let scene = Scene::new(renamed, points.clone()).unwrap();
+        let target = folder.path().join("copy");
+        assert_refused(write_scene(&target, &scene), &["views[0].name", name, ".png"]);
+        assert!(!target.exists(), "nothing is written");
+    }
 }

@@ -15,6 +15,7 @@ use tempfile::{TempDir, tempdir};
 /// 5 and 2 of the scene, both used by pixel 3, the second by pixel 4.
 fn result() -> ViewResult {
     let mut result = ViewResult {
+        width: 6,
         estimate: Maps { depth: vec![0.0; 24], normal: vec![[0.0; 3]; 24] },
         cost: vec![0.0; 24],
         outcome: vec![Outcome::Masked; 24],
@@ -144,4 +145,31 @@ fn all_maps_of_a_workspace_are_read_and_missing_ones_named() {
     std::fs::remove_file(workspace.depth_map(NAME, MapKind::Geometric)).unwrap();
     let maps = workspace.read(&found).unwrap();
     assert_eq!((maps.kind, &maps.views[1].maps), (MapKind::Photometric, &result().estimate));
+}
+
+#[test]
+fn a_workspace_takes_the_scene_in_and_lists_its_images() {
+    let (folder, workspace) = scene();
+    let names: Vec<String> = model().images.into_iter().map(|image| image.name).collect();
+    workspace.write_lists(names.iter().map(String::as_str)).unwrap();
+    let stereo = workspace.folder().join("stereo");
+    let lines = |file: &str| std::fs::read_to_string(stereo.join(file)).unwrap();
+    assert_eq!(lines("fusion.cfg").lines().collect::<Vec<_>>(), names);
+    assert_eq!(lines("patch-match.cfg").lines().nth(3), Some("__auto__, 20"));
+
+    let outside = SceneFolder::find(folder.path()).unwrap();
+    std::fs::create_dir_all(workspace.folder().join("sparse")).unwrap();
+    let own = workspace.folder().join("sparse/points3D.txt");
+    std::fs::write(&own, "# mine\n").unwrap();
+    // A second time nothing is in the way.
+    for _ in 0..2 {
+        workspace.adopt(&outside).unwrap();
+        let inside = SceneFolder::find(workspace.folder()).unwrap();
+        assert_eq!(inside.sparse, workspace.folder().join("sparse"));
+        for name in &names {
+            let read = |folder: &SceneFolder| std::fs::read(folder.images.join(name)).unwrap();
+            assert_eq!(read(&inside), read(&outside), "{name}");
+        }
+    }
+    assert_eq!(std::fs::read_to_string(own).unwrap(), "# mine\n", "what is there stays");
 }

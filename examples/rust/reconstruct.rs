@@ -1,0 +1,58 @@
+//! A scene folder in, maps and a cloud out: `cargo run --release --example reconstruct -- SCENE DENSE`.
+
+use skep::io::{SceneFolder, Workspace, read_scene};
+use skep::{Options, Outcome, Progress};
+use std::io::Write;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let outcome = match &arguments[..] {
+        [scene, dense] => reconstruct(Path::new(scene), Path::new(dense)),
+        _ => {
+            eprintln!("usage: reconstruct SCENE DENSE (SCENE holds images/ and sparse/)");
+            std::process::exit(2);
+        }
+    };
+    if let Err(error) = outcome {
+        eprintln!("reconstruct: {error}");
+        std::process::exit(1);
+    }
+}
+
+fn reconstruct(folder: &Path, dense: &Path) -> skep::Result<()> {
+    let scene = read_scene(folder, None)?;
+    // Options are fields, and have names too.
+    let mut options = Options { seed: 1, ..Options::default() };
+    options.set("fusion.min_views", 2.0)?;
+
+    let result = skep::reconstruct(&scene, &options, &show)?;
+    eprintln!();
+    for warning in &result.warnings {
+        eprintln!("note: {warning}");
+    }
+
+    let workspace = Workspace::new(dense);
+    for (view, found) in scene.views().iter().zip(&result.views) {
+        workspace.write_view(&view.name, &view.camera, found)?;
+        let counts = found.outcome_counts();
+        let validated = 100.0 * counts[Outcome::Validated as usize] as f64 / found.outcome.len() as f64;
+        println!("{}: {validated:.1} % validated, from {} source views", view.name, found.sources.len());
+        for outcome in Outcome::ALL.into_iter().skip(1).filter(|&outcome| counts[outcome as usize] > 0) {
+            println!("  {:>9} pixels {}", counts[outcome as usize], outcome.name());
+        }
+    }
+    workspace.write_lists(scene.views().iter().map(|view| view.name.as_str()))?;
+    workspace.adopt(&SceneFolder::find(folder)?)?;
+    Workspace::write_cloud(&workspace.cloud(), &result.points)?;
+    println!("{} points in {}", result.points.positions.len(), workspace.cloud().display());
+    Ok(())
+}
+
+/// Called often and from any thread; `Break` would cancel.
+fn show(progress: &Progress) -> ControlFlow<()> {
+    eprint!("\r{:3.0} % {:<6}", progress.done * 100.0, progress.phase.name());
+    let _ = std::io::stderr().flush();
+    ControlFlow::Continue(())
+}
