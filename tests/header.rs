@@ -33,3 +33,29 @@ fn the_committed_header_is_the_one_the_source_gives() {
         differs.map(|line| line + 1)
     );
 }
+
+/// maturin makes the declarations of the Python package with a cbindgen of its own, from the whole crate; cffi then knows
+/// no directive but numbers.
+#[test]
+fn the_whole_crate_declares_the_same_for_python() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut config = cbindgen::Config::from_file(root.join("cbindgen.toml")).expect("cbindgen.toml is in order");
+    config.sys_includes = Vec::new();
+    config.include_guard = None;
+    config.cpp_compat = false;
+    let builder = cbindgen::Builder::new().with_config(config).with_crate(root);
+    let mut generated = Vec::new();
+    builder.generate().expect("the source can be understood").write(&mut generated);
+    let generated = String::from_utf8(generated).expect("a header is text");
+    for directive in generated.lines().filter(|line| line.starts_with('#')) {
+        let definition = directive.strip_prefix("#define ").and_then(|rest| rest.split_once(' '));
+        assert!(
+            definition.is_some_and(|(_, value)| value.parse::<i64>().is_ok()),
+            "cffi cannot read '{directive}': name it under [export] exclude in cbindgen.toml"
+        );
+    }
+    let interface = std::fs::read_to_string(root.join("include/skep.h")).expect("include/skep.h is there");
+    let is_declared = |line: &str| generated.lines().any(|other| other == line);
+    let missing = interface.lines().find(|line| line.starts_with("skep_") && !is_declared(line));
+    assert_eq!(missing, None, "the crate as a whole does not declare it");
+}

@@ -1,0 +1,90 @@
+"""Dense multi-view stereo on the CPU.
+
+Calibrated photographs go in; depth, normal and source-view maps and a fused point cloud come out:
+
+    scene = skep.Scene()
+    for photograph, (K, R, t) in zip(photographs, cameras):
+        scene.add_view(photograph, skep.Camera(K, R, t), depth_range=(2.0, 6.0))
+    result = skep.reconstruct(scene, progress=lambda progress: print(f"{progress.done:.0%}"))
+    depth, points = result[0].depth, result.cloud.positions
+
+There are three levels, which can be mixed: whole runs (`reconstruct`), a run taken apart (`Steps`), and kernels
+(`plane_homographies`, `patch_ncc`).
+
+What holds everywhere: x_cam = R x_world + t with x right, y down, z forward; depth is z; the centre of the top-left
+pixel is (0, 0). Arrays that go in are copied, or only read during the call. The same input, options and version give
+the same bits. Calls release the interpreter's lock, and any function may be called from any thread.
+"""
+
+from ._camera import Camera
+from ._cloud import Cloud, FusionView, fuse
+from ._errors import ArgumentError, Cancelled, CapacityError, Error, FileError, InternalError, StateError
+from ._files import (
+    read_consistency_graph,
+    read_depth_map,
+    read_normal_map,
+    write_consistency_graph,
+    write_depth_map,
+    write_normal_map,
+)
+from ._kernels import Samples, Window, patch_ncc, plane_homographies, plane_through
+from ._native import ffi as _ffi, lib as _lib
+from ._options import Options, Scale
+from ._pycolmap import from_pycolmap
+from ._result import Cycle, Outcome, Result, ResultView, Statistics, reconstruct
+from ._run import Phase, Progress
+from ._scene import Scene
+from ._steps import Offers, State, StateInfo, StateMaps, Step, Steps
+
+__version__: str = _ffi.string(_lib.skep_version()).decode()
+
+
+def backend_name() -> str:
+    """The instruction set of runs: "scalar", "base" or "v3" (AVX2). Results do not depend on it."""
+    name: str = _ffi.string(_lib.skep_backend_name()).decode()
+    return name
+
+
+__all__ = [
+    "ArgumentError",
+    "Camera",
+    "Cancelled",
+    "CapacityError",
+    "Cloud",
+    "Cycle",
+    "Error",
+    "FileError",
+    "FusionView",
+    "InternalError",
+    "Offers",
+    "Options",
+    "Outcome",
+    "Phase",
+    "Progress",
+    "Result",
+    "ResultView",
+    "Samples",
+    "Scale",
+    "Scene",
+    "State",
+    "StateError",
+    "StateInfo",
+    "StateMaps",
+    "Statistics",
+    "Step",
+    "Steps",
+    "Window",
+    "backend_name",
+    "from_pycolmap",
+    "fuse",
+    "patch_ncc",
+    "plane_homographies",
+    "plane_through",
+    "read_consistency_graph",
+    "read_depth_map",
+    "read_normal_map",
+    "reconstruct",
+    "write_consistency_graph",
+    "write_depth_map",
+    "write_normal_map",
+]

@@ -1,0 +1,61 @@
+"""Failures as exceptions. Their texts are the library's: the argument, its value, and what would have been right."""
+
+from __future__ import annotations
+
+from ._native import ffi, lib
+
+
+class Error(Exception):
+    """What every call of the library raises; `status` is the C ABI's number for it."""
+
+    status: int = 0
+
+
+class ArgumentError(Error, ValueError):
+    """A value cannot be used: out of range, not a number, of the wrong size, unknown, or in the wrong order."""
+
+    status = lib.SKEP_ERR_ARGUMENT
+
+
+class StateError(Error, RuntimeError):
+    """The object cannot be used any more: a call that was changing it failed inside the library."""
+
+    status = lib.SKEP_ERR_STATE
+
+
+class Cancelled(Error):
+    """The progress callback asked to stop."""
+
+    status = lib.SKEP_ERR_CANCELLED
+
+
+class FileError(Error, OSError):
+    """A file cannot be read, understood or written."""
+
+    status = lib.SKEP_ERR_FILE
+
+
+class CapacityError(Error):
+    """A buffer is smaller than what goes into it."""
+
+    status = lib.SKEP_ERR_CAPACITY
+
+
+class InternalError(Error, RuntimeError):
+    """An error of the library itself; please report the text."""
+
+    status = lib.SKEP_ERR_PANIC
+
+
+_KINDS = (ArgumentError, StateError, Cancelled, FileError, CapacityError, InternalError)
+_BY_STATUS: dict[int, type[Error]] = {kind.status: kind for kind in _KINDS}
+
+
+def check(status: int) -> None:
+    """Raises what a call of this thread came to, unless that is success."""
+    if status == lib.SKEP_OK:
+        return
+    size = lib.skep_last_error(ffi.NULL, 0)
+    text = ffi.new("char[]", size)
+    lib.skep_last_error(text, size)
+    raise _BY_STATUS.get(status, InternalError)(ffi.string(text).decode())

@@ -1,0 +1,91 @@
+"""The method's kernels by themselves: stateless, for any number of threads."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ._buffers import doubles, indices, pointer
+from ._camera import Camera
+from ._errors import ArgumentError, check
+from ._images import Order, image as to_image
+from ._native import ffi, lib
+
+
+def plane_through(camera: Camera, x: float, y: float, depth: float, normal: ArrayLike) -> NDArray[np.float64]:
+    """The plane with this unit normal through the point at `depth` behind a pixel, which need not be whole.
+
+    A plane is four numbers in the camera's frame, a unit normal that faces the camera and a distance: normal . X = -distance.
+    """
+    given = doubles(normal, (3,), "normal")
+    plane = np.empty(4)
+    out = ffi.cast("skep_plane *", pointer(plane))
+    check(lib.skep_plane_through(camera.to_c(), x, y, depth, pointer(given), out))
+    return plane
+
+
+def plane_homographies(reference: Camera, source: Camera, planes: ArrayLike) -> NDArray[np.float64]:
+    """H = K' (R - t n^T / D) K^-1 of planes (n, 4), so that (x', y', 1) ~ H (x, y, 1); (n, 3, 3)."""
+    given = doubles(planes, (-1, 4), "planes")
+    homographies = np.empty((len(given), 3, 3))
+    structs = ffi.cast("skep_plane *", pointer(given))
+    cameras = reference.to_c(), source.to_c()
+    check(lib.skep_plane_homographies(*cameras, structs, len(given), pointer(homographies)))
+    return homographies
+
+
+class Samples:
+    """An image, copied into the layout the kernels sample. Never changes."""
+
+    __slots__ = ("_handle",)
+
+    _handle: Any
+
+    def __init__(self, image: NDArray[Any], order: Order = "rgb") -> None:
+        given = to_image(image, order)
+        out = ffi.new("skep_samples **")
+        check(lib.skep_samples_create(given.struct, out))
+        self._handle = ffi.gc(out[0], lib.skep_samples_destroy)
+
+
+class Window:
+    """A square window of half side `radius`, sampled every `step` pixels. Never changes.
+
+    A sample weighs exp(-r^2 / (2 spatial_sigma^2) - dI^2 / (2 colour_sigma^2)), r pixels and dI of grey from the centre;
+    infinite sigmas, the default, weigh all alike. A patch of less weighted variance than `min_variance` has no texture.
+    """
+
+    __slots__ = ("_handle",)
+
+    _handle: Any
+
+    def __init__(
+        self,
+        radius: int = 5,
+        step: int = 2,
+        spatial_sigma: float = math.inf,
+        colour_sigma: float = math.inf,
+        min_variance: float = 1e-5,
+    ) -> None:
+        out = ffi.new("skep_window **")
+        check(lib.skep_window_create(radius, step, spatial_sigma, colour_sigma, min_variance, out))
+        self._handle = ffi.gc(out[0], lib.skep_window_destroy)
+
+
+def patch_ncc(
+    window: Window, reference: Samples, source: Samples, pixels: ArrayLike, homographies: ArrayLike
+) -> NDArray[np.float32]:
+    """Normalised cross-correlations of patches around `pixels` (n, 2) of the reference, x before y, with their images in
+    the source by `homographies` (n, 3, 3): -1 to 1; -1 also where either side has no texture.
+    """
+    centres = indices(np.asarray(pixels), "pixels")
+    ways = doubles(homographies, (-1, 3, 3), "homographies")
+    if centres.shape != (len(ways), 2):
+        raise ArgumentError(f"pixels has shape {centres.shape}: must be ({len(ways)}, 2), one for each homography")
+    ncc = np.empty(len(ways), dtype=np.float32)
+    samples = reference._handle, source._handle
+    check(lib.skep_patch_ncc(window._handle, *samples, pointer(centres), pointer(ways), len(ways), pointer(ncc)))
+    return ncc

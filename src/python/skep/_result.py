@@ -1,0 +1,226 @@
+"""Whole runs, and what they give for each view."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _options
+from ._buffers import borrow, index, path, pointer, take_indices, take_text
+from ._cloud import Cloud
+from ._errors import ArgumentError, check
+from ._native import ffi, lib
+from ._options import Options
+from ._run import ProgressFunction, run
+from ._scene import Scene
+
+T = TypeVar("T")
+
+
+class Outcome(IntEnum):
+    """What became of a pixel: the reason where there is no validated depth."""
+
+    VALIDATED = lib.SKEP_PIXEL_VALIDATED
+    """The solution is consistent with enough source views."""
+    MASKED = lib.SKEP_PIXEL_MASKED
+    """The mask leaves the pixel out."""
+    NO_TEXTURE = lib.SKEP_PIXEL_NO_TEXTURE
+    """The window around the pixel is too uniform to be matched."""
+    NO_SOURCES = lib.SKEP_PIXEL_NO_SOURCES
+    """Fewer than two source views can see the solution."""
+    INCONSISTENT = lib.SKEP_PIXEL_INCONSISTENT
+    """Too few source views agree with the solution."""
+    OUT_OF_RANGE = lib.SKEP_PIXEL_OUT_OF_RANGE
+    """The solution lies at an end of the depth range: the surface may lie beyond."""
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What a view cost and what became of its pixels. Counts do not depend on the machine."""
+
+    ncc_evaluations: int
+    """Patches compared with a patch in one source view."""
+    samples: int
+    """Bilinear samples taken from source views."""
+    early_outs: int
+    """Hypotheses given up before all their source views were looked at."""
+    pixels: Mapping[Outcome, int]
+    """Number of pixels of each outcome."""
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """One cycle's search of one view."""
+
+    reduction: int
+    """Size of the images: 1 is full, 2 half, 4 a quarter."""
+    cycle: int
+    """The cycle on that scale, counted from 0."""
+    pixels: int
+    """Pixels searched."""
+    changed: int
+    """Pixels whose solution changed."""
+    validated: int
+    """Pixels validated by the check after it."""
+
+
+class ResultView:
+    """The maps of one view.
+
+    Raw maps are read-only arrays that look into the result, which lives as long as they do; the others are copies, made
+    when they are first asked for.
+    """
+
+    def __init__(self, handle: Any, view: int) -> None:
+        self._handle = handle
+        self.view = view
+        """The view's number in the scene."""
+        width, height = ffi.new("uint32_t *"), ffi.new("uint32_t *")
+        check(lib.skep_result_get_size(handle, index(view, "view"), width, height))
+        self.size: tuple[int, int] = (width[0], height[0])
+        """Width and height of the maps."""
+
+    def __repr__(self) -> str:
+        return f"<skep.ResultView of view {self.view}, {self.size[0]} x {self.size[1]}>"
+
+    def _borrow(self, function: Any, c_type: str, dtype: Any, *channels: int) -> NDArray[Any]:
+        address = ffi.new(f"const {c_type} **")
+        check(function(self._handle, self.view, address))
+        return borrow(self._handle, address[0], dtype, (*self.size[::-1], *channels))
+
+    def _copy(self, function: Any, which: tuple[int, ...], dtype: Any, *channels: int) -> NDArray[Any]:
+        copied = np.empty((*self.size[::-1], *channels), dtype=dtype)
+        check(function(self._handle, self.view, *which, pointer(copied), copied.strides[0]))
+        return copied
+
+    @cached_property
+    def depth(self) -> NDArray[np.float32]:
+        """The raw depth of every pixel in world units, 0 where there is no estimate; (height, width)."""
+        return self._borrow(lib.skep_result_borrow_depth, "float", np.float32)
+
+    @cached_property
+    def normal(self) -> NDArray[np.float32]:
+        """Raw unit normals in the view's camera frame, facing the camera, zeros where none; (height, width, 3)."""
+        return self._borrow(lib.skep_result_borrow_normal, "float", np.float32, 3)
+
+    @cached_property
+    def cost(self) -> NDArray[np.float32]:
+        """The mean of 1 - NCC over each pixel's source views, 0 to 2; lower is surer."""
+        return self._borrow(lib.skep_result_borrow_cost, "float", np.float32)
+
+    @cached_property
+    def outcome(self) -> NDArray[np.uint8]:
+        """What became of every pixel: values of `Outcome`."""
+        return self._borrow(lib.skep_result_borrow_outcome, "uint8_t", np.uint8)
+
+    @cached_property
+    def validated_depth(self) -> NDArray[np.float32]:
+        """The depth that other views confirm, 0 elsewhere."""
+        return self._copy(lib.skep_result_get_depth, (lib.SKEP_MAPS_VALIDATED,), np.float32)
+
+    @cached_property
+    def validated_normal(self) -> NDArray[np.float32]:
+        """The normals that other views confirm, zeros elsewhere."""
+        return self._copy(lib.skep_result_get_normal, (lib.SKEP_MAPS_VALIDATED,), np.float32, 3)
+
+    @cached_property
+    def source_count(self) -> NDArray[np.uint16]:
+        """The number of source views of every pixel."""
+        return self._copy(lib.skep_result_get_source_count, (), np.uint16)
+
+    @cached_property
+    def sources(self) -> tuple[int, ...]:
+        """The source views of the view, as numbers of the scene's views."""
+        return take_indices(lambda *out: lib.skep_result_get_sources(self._handle, self.view, *out))
+
+    def matched_with(self, source: int) -> NDArray[np.bool_]:
+        """Which pixels were matched with a source view of `sources`."""
+        if source not in self.sources:
+            raise ArgumentError(f"source is {source}: must be one of {self.sources}")
+        word, bit = divmod(self.sources.index(source), 32)
+        words = self._copy(lib.skep_result_get_source_bits, (word,), np.uint32)
+        matched: NDArray[np.bool_] = (words >> np.uint32(bit)) & np.uint32(1) != 0
+        return matched
+
+    @cached_property
+    def statistics(self) -> Statistics:
+        """What the view cost and what became of its pixels."""
+        found = ffi.new("skep_statistics *")
+        check(lib.skep_result_get_statistics(self._handle, self.view, found))
+        pixels = {outcome: found.pixels[outcome] for outcome in Outcome}
+        return Statistics(found.ncc_evaluations, found.samples, found.early_outs, pixels)
+
+    @cached_property
+    def cycles(self) -> tuple[Cycle, ...]:
+        """The cycles of the view in order."""
+        count = ffi.new("size_t *")
+        check(lib.skep_result_get_cycles(self._handle, self.view, ffi.NULL, 0, count))
+        found = ffi.new("skep_cycle[]", count[0])
+        check(lib.skep_result_get_cycles(self._handle, self.view, found, count[0], count))
+        return tuple(Cycle(one.reduction, one.cycle, one.pixels, one.changed, one.validated) for one in found)
+
+
+class Result:
+    """What a whole run gives: `result[view]` are the maps of a view, `len(result)` the number of views."""
+
+    def __init__(self, handle: Any) -> None:
+        self._handle = handle
+        self.views: tuple[ResultView, ...] = tuple(_until_refused(lambda view: ResultView(handle, view)))
+
+    def __len__(self) -> int:
+        return len(self.views)
+
+    def __getitem__(self, view: int) -> ResultView:
+        return self.views[view]
+
+    def __iter__(self) -> Iterator[ResultView]:
+        return iter(self.views)
+
+    def __repr__(self) -> str:
+        return f"<skep.Result of {len(self)} views>"
+
+    @cached_property
+    def cloud(self) -> Cloud:
+        """The fused points."""
+        out = ffi.new("skep_cloud **")
+        check(lib.skep_result_get_cloud(self._handle, out))
+        return Cloud(ffi.gc(out[0], lib.skep_cloud_destroy))
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences about the run that its user should read."""
+        ask = lib.skep_result_get_warning
+        warning = lambda number: take_text(lambda *out: ask(self._handle, number, *out))
+        return tuple(_until_refused(warning))
+
+    def write_workspace(self, scene: Scene, folder: str | os.PathLike[str]) -> None:
+        """Writes what COLMAP calls a dense folder, less images/ and sparse/, which `Scene.write_colmap` writes."""
+        check(lib.skep_result_write_workspace(self._handle, scene._handle, path(folder, "folder")))
+
+
+def _until_refused(item: Callable[[int], T]) -> Iterator[T]:
+    """The items with the numbers 0, 1, ..., as many as there are."""
+    for number in itertools.count():
+        try:
+            yield item(number)
+        except ArgumentError:
+            return
+
+
+def reconstruct(scene: Scene, options: Options | None = None, progress: ProgressFunction | None = None) -> Result:
+    """Estimates depth, normal and source views of every pixel of every view, and fuses what was validated.
+
+    `progress` is called in this thread; a true answer cancels the run, which raises `Cancelled`. An exception, as is
+    KeyboardInterrupt, cancels it too.
+    """
+    chosen = _options.handle(options)
+    call = lambda *hook: lib.skep_reconstruct(scene._handle, chosen, *hook)
+    return Result(run(call, "skep_result", progress))

@@ -1,0 +1,128 @@
+"""Long calls: their progress, and how they are stopped.
+
+The library calls back from threads of its own, where Python handles no signals, and while the calling thread waits in
+C it handles none either. So the call is made in a thread of its own, and the calling thread waits in Python: there it
+shows progress, and a signal's handler can raise, as KeyboardInterrupt does, which stops the call.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+from ._errors import check
+from ._native import ffi, lib
+
+
+class Phase(IntEnum):
+    """What is being done."""
+
+    SEARCH = lib.SKEP_PHASE_SEARCH
+    CHECK = lib.SKEP_PHASE_CHECK
+    FUSION = lib.SKEP_PHASE_FUSION
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a call stands."""
+
+    done: float
+    """Share of the whole call that is done, 0 to 1."""
+    phase: Phase
+    reduction: int
+    """Size of the images searched: 1 is full, 2 half, 4 a quarter."""
+    cycle: int
+    """The cycle on this scale, counted from 0."""
+    view: int
+    """The view at work."""
+    view_count: int
+
+
+ProgressFunction = Callable[[Progress], object]
+"""Called in the thread that made the call, whenever there is news and it is idle. What is true cancels the call, which
+then raises `Cancelled`; an exception cancels it too, and is raised from it."""
+
+
+class _Call:
+    """A call under way in its own thread."""
+
+    def __init__(self, call: Callable[[Any, Any, Any], int], kind: str) -> None:
+        self.news = threading.Condition()
+        self.latest: Progress | None = None
+        self.cancelled = False
+        self.ended = False
+        self.found: Any = None
+        self.failure: BaseException | None = None
+        # Not a daemon: the interpreter must not go away under the library's feet.
+        self.thread = threading.Thread(target=self.make, args=(call, kind), name="skep")
+
+    def make(self, call: Callable[[Any, Any, Any], int], kind: str) -> None:
+        callback = ffi.callback("skep_progress_fn", self.hear, error=1)
+        out = ffi.new(f"{kind} **")
+        try:
+            # Here, because the text of an error is told to the thread that met it.
+            check(call(callback, ffi.NULL, out))
+            self.found = ffi.gc(out[0], getattr(lib, f"{kind}_destroy"))
+        except BaseException as failure:
+            self.failure = failure
+        with self.news:
+            self.ended = True
+            self.news.notify()
+
+    def hear(self, _user: Any, progress: Any) -> int:
+        with self.news:
+            self.latest = Progress(
+                done=progress.done,
+                phase=Phase(progress.phase),
+                reduction=progress.reduction,
+                cycle=progress.cycle,
+                view=progress.view,
+                view_count=progress.view_count,
+            )
+            self.news.notify()
+            return int(self.cancelled)
+
+    def tell(self, function: ProgressFunction) -> None:
+        """Shows the caller what is new until the call ends or the caller has seen enough."""
+        while not self.cancelled:
+            with self.news:
+                while self.latest is None and not self.ended:
+                    self.news.wait()
+                progress, self.latest = self.latest, None
+            if progress is None:
+                return
+            if function(progress):
+                self.cancelled = True
+
+
+def run(call: Callable[[Any, Any, Any], int], kind: str, progress: ProgressFunction | None) -> Any:
+    """Makes `call(progress_function, user, out)` and waits until it has ended; gives the object of this kind that it put
+    out, or raises what it came to.
+    """
+    under_way = _Call(call, kind)
+    try:
+        under_way.thread.start()
+        under_way.tell(progress or (lambda _: False))
+    except BaseException:
+        under_way.cancelled = True
+        raise
+    finally:
+        _join(under_way.thread)
+    if under_way.failure is not None:
+        raise under_way.failure
+    return under_way.found
+
+
+def _join(thread: threading.Thread) -> None:
+    """Waits for a call that has ended or is about to, whatever signals come meanwhile."""
+    interruption: BaseException | None = None
+    while thread.is_alive():
+        try:
+            thread.join()
+        except BaseException as another:
+            interruption = another
+    if interruption is not None:
+        raise interruption

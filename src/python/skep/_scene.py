@@ -1,0 +1,189 @@
+"""Calibrated photographs and sparse points."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _options
+from ._buffers import doubles, index, indices, path, pointer, rows, take_indices, take_text, text
+from ._camera import Camera
+from ._errors import ArgumentError, check
+from ._images import Order, image as to_image
+from ._native import ffi, lib
+from ._options import Options
+
+
+class Scene:
+    """Calibrated photographs and sparse points; `len(scene)` is the number of views.
+
+    Runs that were started with it keep what it was when they started.
+    """
+
+    __slots__ = ("_handle",)
+
+    _handle: Any
+
+    def __init__(self) -> None:
+        out = ffi.new("skep_scene **")
+        check(lib.skep_scene_create(out))
+        self._handle = ffi.gc(out[0], lib.skep_scene_destroy)
+
+    @classmethod
+    def read_colmap(cls, folder: str | os.PathLike[str], depth_range: tuple[float, float] | None = None) -> Scene:
+        """Reads a folder with images/ and a COLMAP model in sparse/ or sparse/0/.
+
+        `depth_range` is that of every view; None takes it from the sparse points.
+        """
+        near, far = depth_range or (0.0, 0.0)
+        out = ffi.new("skep_scene **")
+        check(lib.skep_scene_read_colmap(path(folder, "folder"), near, far, out))
+        scene = cls.__new__(cls)
+        scene._handle = ffi.gc(out[0], lib.skep_scene_destroy)
+        return scene
+
+    def write_colmap(self, folder: str | os.PathLike[str]) -> None:
+        """Writes a folder that COLMAP and `read_colmap` read. The views' names must end in .png."""
+        check(lib.skep_scene_write_colmap(self._handle, path(folder, "folder")))
+
+    def add_view(
+        self,
+        image: NDArray[Any],
+        camera: Camera,
+        *,
+        name: str | None = None,
+        order: Order = "rgb",
+        mask: NDArray[Any] | None = None,
+        depth_range: tuple[float, float] | None = None,
+    ) -> int:
+        """Adds a photograph, copied, and tells its number.
+
+        `image` has shape (height, width) or (height, width, 1, 3 or 4) and type uint8, uint16, or float32 from 0 to 1;
+        `order` is that of its channels. Rows may lie apart, as in a part of a larger image.
+        """
+        given = to_image(image, order)
+        # A view that was added stays: what could be refused later is tried before.
+        if mask is not None:
+            _mask_rows(mask, given.array.shape[:2])
+        if depth_range is not None:
+            _try_depth_range(depth_range, camera)
+        view = ffi.new("uint32_t *")
+        label = ffi.NULL if name is None else text(name, "name")
+        check(lib.skep_scene_add_view(self._handle, label, given.struct, camera.to_c(), view))
+        number: int = view[0]
+        if mask is not None:
+            self.set_mask(number, mask)
+        if depth_range is not None:
+            self.set_depth_range(number, depth_range)
+        return number
+
+    def set_mask(self, view: int, mask: NDArray[Any] | None) -> None:
+        """Says where depths are wanted, by booleans or bytes; None takes the mask away.
+
+        Masked pixels still serve as sources for other views.
+        """
+        if mask is None:
+            check(lib.skep_scene_set_mask(self._handle, index(view, "view"), ffi.NULL, 0))
+            return
+        width, height = self.size(view)
+        given = _mask_rows(mask, (height, width))
+        check(lib.skep_scene_set_mask(self._handle, view, given.pointer, given.stride))
+
+    def set_depth_range(self, view: int, depth_range: tuple[float, float] | None) -> None:
+        """Says between which depths surfaces are looked for; None goes back to what the sparse points suggest."""
+        near, far = depth_range or (0.0, 0.0)
+        check(lib.skep_scene_set_depth_range(self._handle, index(view, "view"), near, far))
+
+    def set_sources(self, view: int, sources: Iterable[int] | None) -> None:
+        """Says which views a view is matched with, the most important first; they may be added later.
+
+        None goes back to choosing them by their triangulation angle.
+        """
+        given = indices(sources or (), "sources")
+        check(lib.skep_scene_set_sources(self._handle, index(view, "view"), pointer(given), given.size))
+
+    def add_points(self, positions: ArrayLike, views: Sequence[Iterable[int]]) -> None:
+        """Adds sparse points of shape (n, 3) with the views that saw each of them, which may be added later.
+
+        Points give the depth ranges and choose the source views; without any, give each view a depth range.
+        """
+        points = doubles(positions, (-1, 3), "positions")
+        lists = [indices(seen, "views") for seen in views]
+        if len(lists) != len(points):
+            raise ArgumentError(f"views are {len(lists)} lists: must be one for each of the {len(points)} points")
+        counts = np.array([seen.size for seen in lists], dtype=np.uint32)
+        flat = np.concatenate(lists) if lists else np.zeros(0, dtype=np.uint32)
+        check(
+            lib.skep_scene_add_points(
+                self._handle, pointer(points), len(points), pointer(counts), pointer(flat), flat.size
+            )
+        )
+
+    def validate(self) -> None:
+        """Checks the scene as a run would."""
+        check(lib.skep_scene_validate(self._handle))
+
+    def __len__(self) -> int:
+        count = ffi.new("uint32_t *")
+        check(lib.skep_scene_view_count(self._handle, count))
+        number: int = count[0]
+        return number
+
+    def __repr__(self) -> str:
+        return f"<skep.Scene of {len(self)} views>"
+
+    def size(self, view: int) -> tuple[int, int]:
+        """Width and height."""
+        width, height = ffi.new("uint32_t *"), ffi.new("uint32_t *")
+        check(lib.skep_scene_get_view(self._handle, index(view, "view"), width, height, ffi.NULL))
+        return width[0], height[0]
+
+    def camera(self, view: int) -> Camera:
+        """A view's camera."""
+        camera = ffi.new("skep_camera *")
+        check(lib.skep_scene_get_view(self._handle, index(view, "view"), ffi.NULL, ffi.NULL, camera))
+        return Camera.from_c(camera)
+
+    def name(self, view: int) -> str:
+        """A view's name in messages and files."""
+        index(view, "view")
+        return take_text(lambda *out: lib.skep_scene_get_name(self._handle, view, *out))
+
+    def depth_range(self, view: int) -> tuple[float, float]:
+        """What a run would search: the view's own, or what its sparse points suggest."""
+        near, far = ffi.new("double *"), ffi.new("double *")
+        check(lib.skep_scene_get_depth_range(self._handle, index(view, "view"), near, far))
+        return near[0], far[0]
+
+    def sources(self, view: int, options: Options | None = None) -> tuple[int, ...]:
+        """The source views a run with these options would match a view with."""
+        index(view, "view")
+        chosen = _options.handle(options)
+        return take_indices(lambda *out: lib.skep_scene_get_sources(self._handle, chosen, view, *out))
+
+    def overlap(self, view: int) -> tuple[int, ...]:
+        """The views that may see the same surface as a view, which is what fusion asks."""
+        index(view, "view")
+        return take_indices(lambda *out: lib.skep_scene_get_overlap(self._handle, view, *out))
+
+    def triangulation_angle(self, reference: int, source: int) -> float | None:
+        """The angle of two views in degrees; None when they see nothing together."""
+        degrees = ffi.new("double *")
+        views = index(reference, "reference"), index(source, "source")
+        check(lib.skep_scene_triangulation_angle(self._handle, *views, degrees))
+        return None if degrees[0] < 0 else degrees[0]
+
+
+def _mask_rows(mask: NDArray[Any], shape: tuple[int, ...]) -> Any:
+    given = np.asarray(mask)
+    return rows(given.view(np.uint8) if given.dtype == bool else given, np.uint8, shape, "mask")
+
+
+def _try_depth_range(depth_range: tuple[float, float], camera: Camera) -> None:
+    trial = Scene()
+    trial.add_view(np.zeros((1, 1), dtype=np.uint8), camera)
+    trial.set_depth_range(0, depth_range)
