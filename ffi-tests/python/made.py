@@ -1,4 +1,4 @@
-"""A world made in code, whose depths and normals are known exactly: a ball before a tilted wall, both full of texture."""
+"""A world made in code, whose depths and normals are known exactly: a textured ball before a tilted, textured wall."""
 
 from __future__ import annotations
 

@@ -18,7 +18,8 @@ from ._native import ffi, lib
 def plane_through(camera: Camera, x: float, y: float, depth: float, normal: ArrayLike) -> NDArray[np.float64]:
     """The plane with this unit normal through the point at `depth` behind a pixel, which need not be whole.
 
-    A plane is four numbers in the camera's frame, a unit normal that faces the camera and a distance: normal . X = -distance.
+    A plane is four numbers in the camera's frame: a unit normal that faces the camera, and a distance, so that
+    normal . X = -distance.
     """
     given = doubles(normal, (3,), "normal")
     plane = np.empty(4)
@@ -54,8 +55,9 @@ class Samples:
 class Window:
     """A square window of half side `radius`, sampled every `step` pixels. Never changes.
 
-    A sample weighs exp(-r^2 / (2 spatial_sigma^2) - dI^2 / (2 colour_sigma^2)), r pixels and dI of grey from the centre;
-    infinite sigmas, the default, weigh all alike. A patch of less weighted variance than `min_variance` has no texture.
+    A sample weighs exp(-r^2 / (2 spatial_sigma^2) - dI^2 / (2 colour_sigma^2)), r pixels and dI of grey from the
+    centre; infinite sigmas, the default, weigh all alike. A patch of less weighted variance than `min_variance` has no
+    texture.
     """
 
     __slots__ = ("_handle",)
@@ -78,8 +80,8 @@ class Window:
 def patch_ncc(
     window: Window, reference: Samples, source: Samples, pixels: ArrayLike, homographies: ArrayLike
 ) -> NDArray[np.float32]:
-    """Normalised cross-correlations of patches around `pixels` (n, 2) of the reference, x before y, with their images in
-    the source by `homographies` (n, 3, 3): -1 to 1; -1 also where either side has no texture.
+    """Normalised cross-correlations of patches around `pixels` (n, 2) of the reference, x before y, with their images
+    in the source by `homographies` (n, 3, 3): -1 to 1; -1 also where either side has no texture.
     """
     centres = indices(np.asarray(pixels), "pixels")
     ways = doubles(homographies, (-1, 3, 3), "homographies")

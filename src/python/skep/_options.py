@@ -39,8 +39,8 @@ _ATTRIBUTES = {name.replace(".", "_"): name for name in _NAMES}
 class Options(Mapping[str, float]):
     """Options by name, as items or attributes: `options["fusion.min_views"]` is `options.fusion_min_views`.
 
-    Starts from a preset: "default", which measures best, or "paper", which follows the paper to the letter and takes its
-    time. `Options(threads=2, fusion_min_views=2)` sets some at once. Numbers are checked when they are set.
+    Starts from a preset: "default", which measures best, or "paper", which follows the paper to the letter and takes
+    its time. `Options(threads=2, fusion_min_views=2)` sets some at once. Numbers are checked when they are set.
     """
 
     __slots__ = ("_handle", "_seed")

@@ -99,8 +99,8 @@ class _Call:
 
 
 def run(call: Callable[[Any, Any, Any], int], kind: str, progress: ProgressFunction | None) -> Any:
-    """Makes `call(progress_function, user, out)` and waits until it has ended; gives the object of this kind that it put
-    out, or raises what it came to.
+    """Makes `call(progress_function, user, out)` and waits until it has ended; gives the object of this kind that it
+    put out, or raises what it came to.
     """
     under_way = _Call(call, kind)
     try:

@@ -1,0 +1,78 @@
+"""Depth, normals, source views and reasons of a scene, and its cloud from the side, as pictures.
+
+    python board.py [--quick] [SCENE [PICTURES]]
+
+SCENE holds images/ and a COLMAP model in sparse/. `--quick` takes seconds and shows less.
+"""
+
+# %% Where things are
+import sys
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+
+import skep
+
+matplotlib.use("Agg")
+from matplotlib import pyplot
+
+quick = "--quick" in sys.argv
+places = [Path(argument) for argument in sys.argv[1:] if argument != "--quick"]
+folder = places[0] if places else Path(__file__).parent / "../data/board"
+pictures = places[1] if len(places) > 1 else Path("pictures")
+pictures.mkdir(parents=True, exist_ok=True)
+
+# %% The scene: photographs, cameras and sparse points
+scene = skep.Scene.read_colmap(folder)
+for view in range(len(scene)):
+    near, far = scene.depth_range(view)
+    print(f"{scene.name(view)}: {scene.size(view)}, depth {near:.2f} to {far:.2f}, sources {scene.sources(view)}")
+
+# %% The run; Ctrl-C stops it
+options = skep.Options()
+if quick:
+    options.scales = [(2, 4, 6, 3, 1), (1, 3, 2, 1, 1), (0, 2, 0, 1, 1)]
+    options.max_sources = options.focused_views = options.best_views = 3
+
+
+def show(progress: skep.Progress) -> None:
+    print(f"\r{progress.done:4.0%}", end="", flush=True)
+
+
+result = skep.reconstruct(scene, options, show)
+print(f"\r{len(result.cloud)} points", *result.warnings, sep="\n")
+
+# %% The maps of a view: raw ones are the library's own memory, validated ones are copies
+view = result[0]
+depth = np.where(view.validated_depth > 0, view.validated_depth, np.nan)
+panels = {
+    "depth, validated": (depth, "turbo"),
+    "normals, raw": ((view.normal * [1, -1, -1] + 1) / 2, None),
+    "source views of each pixel": (view.source_count, "viridis"),
+    "why pixels are empty": (view.outcome, matplotlib.colormaps["Set2"].resampled(len(skep.Outcome))),
+}
+figure, axes = pyplot.subplots(2, 2, figsize=(12, 8), layout="constrained")
+for axis, (title, (values, colours)) in zip(axes.flat, panels.items()):
+    low, high = (-0.5, len(skep.Outcome) - 0.5) if "why" in title else (None, None)
+    shown = axis.imshow(values, cmap=colours, vmin=low, vmax=high)
+    axis.set(title=title, xticks=[], yticks=[])
+    if "why" in title:
+        names = [outcome.name.lower().replace("_", " ") for outcome in skep.Outcome]
+        figure.colorbar(shown, ax=axis, shrink=0.7).set_ticks(list(skep.Outcome), labels=names)
+    elif colours:
+        figure.colorbar(shown, ax=axis, shrink=0.7)
+figure.savefig(pictures / "maps.png", dpi=80)
+
+# %% The cloud from the side: 50 degrees from where the first camera stands
+cloud = result.cloud
+x, y, z = scene.camera(0).R @ (cloud.positions - np.median(cloud.positions, axis=0)).T
+sine, cosine = np.sin(np.radians(50)), np.cos(np.radians(50))
+across, away = cosine * x + sine * z, cosine * z - sine * x
+order = np.argsort(-away)
+figure, axis = pyplot.subplots(figsize=(8, 6), layout="constrained")
+axis.scatter(across[order], y[order], c=cloud.colours[order] / 255, s=0.5, linewidths=0)
+(left, right), (top, bottom) = np.percentile(across, [1, 99]), np.percentile(y, [1, 99])
+axis.set(title=f"{len(cloud)} points", aspect="equal", xlim=(left, right), ylim=(bottom, top))
+figure.savefig(pictures / "cloud.png", dpi=80)
+print(f"pictures are in {pictures}")

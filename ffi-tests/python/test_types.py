@@ -1,0 +1,65 @@
+"""The package is typed, for its users and in itself."""
+
+import os
+import subprocess
+import sys
+
+import skep
+
+ROOT = os.path.join(os.path.dirname(__file__), "../..")
+USE = """
+import numpy as np
+import skep
+from numpy.typing import NDArray
+from typing_extensions import assert_type
+
+scene = skep.Scene()
+image = np.zeros((4, 4, 3), dtype=np.uint8)
+number = scene.add_view(image, skep.Camera(np.eye(3)), order="bgr", depth_range=(1, 2))
+assert_type(number, int)
+options = skep.Options("paper", seed=1, fusion_min_views=2)
+assert_type(options.fusion_min_views, float)
+assert_type(options.scales, tuple[skep.Scale, ...])
+
+
+def progress(progress: skep.Progress) -> bool:
+    assert_type(progress.phase, skep.Phase)
+    return progress.done > 0.5
+
+
+result = skep.reconstruct(scene, options, progress)
+assert_type(result[0].depth, NDArray[np.float32])
+assert_type(result[0].statistics.pixels[skep.Outcome.MASKED], int)
+assert_type(result.cloud.positions, NDArray[np.float64])
+state: skep.State = skep.Steps(scene).search(0, 0)
+scene.add_view(image, skep.Camera(np.eye(3)), order="gbr")  # wrong
+scene.set_mask("0", None)  # wrong
+skep.Options("best")  # wrong
+"""
+
+
+def mypy(*arguments):
+    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", os.path.join(ROOT, "target/mypy"), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
+
+
+def test_the_package_is_typed_throughout(need):
+    need("mypy")
+    checked = mypy("src/python/skep")
+    assert checked.returncode == 0, checked.stdout
+
+
+def test_users_are_told_what_is_wrong_and_nothing_else(need, tmp_path):
+    need("mypy")
+    use = tmp_path / "use.py"
+    use.write_text(USE)
+    checked = mypy(str(use))
+    told = [int(line.split(":")[1]) for line in checked.stdout.splitlines() if ": error: " in line]
+    wrong = [number for number, line in enumerate(USE.splitlines(), 1) if line.endswith("# wrong")]
+    assert told == wrong, checked.stdout + checked.stderr
+
+
+def test_everything_public_is_there_and_described():
+    for name in skep.__all__:
+        assert getattr(skep, name).__doc__, name
+    assert skep.__version__.count(".") == 2 and skep.backend_name() in ("scalar", "base", "v3")
