@@ -39,7 +39,8 @@ fn the_committed_header_is_the_one_the_source_gives() {
 #[test]
 fn the_whole_crate_declares_the_same_for_python() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut config = cbindgen::Config::from_file(root.join("cbindgen.toml")).expect("cbindgen.toml is in order");
+    let mut config =
+        cbindgen::Config::from_file(root.join("cbindgen.toml")).expect("cbindgen.toml is in order");
     config.sys_includes = Vec::new();
     config.include_guard = None;
     config.cpp_compat = false;
