@@ -32,7 +32,6 @@
 #include <stddef.h>
 #include <stdint.h>
 
-
 /**
  * Version of this interface. It rises with every incompatible change, and the library's SONAME with it.
  */
