@@ -1,12 +1,18 @@
-//! Gives the shared library the name that programs linked with it ask for at run time.
+//! Gives the shared library the name that programs linked with it ask for at run time, and `cargo cinstall` the one
+//! file to install that the version is written in.
+
+use std::path::Path;
+
+const CMAKE_VERSION_TEMPLATE: &str = "include/cmake/skep-config-version.cmake.in";
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
-    let version = |part| std::env::var(part).unwrap_or_default();
-    let (major, minor) = (version("CARGO_PKG_VERSION_MAJOR"), version("CARGO_PKG_VERSION_MINOR"));
+    println!("cargo:rerun-if-changed={CMAKE_VERSION_TEMPLATE}");
+    let variable = |name: &str| std::env::var(name).unwrap_or_default();
+    let (major, minor) = (variable("CARGO_PKG_VERSION_MAJOR"), variable("CARGO_PKG_VERSION_MINOR"));
     // Until 1.0 every minor version may change the interface.
     let suffix = if major == "0" { format!("0.{minor}") } else { major };
-    match version("CARGO_CFG_TARGET_OS").as_str() {
+    match variable("CARGO_CFG_TARGET_OS").as_str() {
         "linux" | "android" | "freebsd" | "netbsd" | "openbsd" => {
             println!("cargo:rustc-cdylib-link-arg=-Wl,-soname,libskep.so.{suffix}");
         }
@@ -15,4 +21,14 @@ fn main() {
         }
         _ => (),
     }
+
+    let template =
+        std::fs::read_to_string(CMAKE_VERSION_TEMPLATE).expect("the template is part of the package");
+    let folder = Path::new(&variable("OUT_DIR")).join("cmake");
+    std::fs::create_dir_all(&folder).expect("cargo's folder for build results can be written");
+    std::fs::write(
+        folder.join("skep-config-version.cmake"),
+        template.replace("@SKEP_VERSION@", &variable("CARGO_PKG_VERSION")),
+    )
+    .expect("cargo's folder for build results can be written");
 }
