@@ -14,6 +14,8 @@ mod files;
 mod fusion;
 mod image;
 mod kernels;
+#[cfg(test)]
+mod layout;
 mod maps;
 mod options;
 mod pointers;
