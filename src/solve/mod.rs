@@ -27,7 +27,7 @@ use std::ops::ControlFlow;
 /// scene, options and crate version give the same bits for any number of threads and any instruction set.
 ///
 /// # Errors
-/// An option out of its range, named; [`Error::Cancelled`] when the hook breaks.
+/// An option out of its range, named; [`crate::Error::Cancelled`] when the hook breaks.
 pub fn reconstruct(scene: &Scene, options: &Options, hook: Hook) -> Result<Reconstruction> {
     options.check()?;
     JoinedPool::new(options.threads)?.install(|| run(scene, options, hook))

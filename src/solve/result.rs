@@ -15,7 +15,7 @@ impl Steps {
     ///
     /// # Errors
     /// A view there is not; states that are not of full size, of another scene or view than they stand for, or not
-    /// marked; no state of the view itself; [`Error::Cancelled`] when the hook breaks.
+    /// marked; no state of the view itself; [`crate::Error::Cancelled`] when the hook breaks.
     pub fn finish(&self, view: usize, states: &[Option<&State>], hook: Hook) -> Result<ViewResult> {
         let step = self.all().len() - 1;
         self.check_place(step, view)?;
