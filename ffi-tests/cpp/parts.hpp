@@ -1,0 +1,24 @@
+// The parts of the test of skep.hpp, and the scene they share.
+#pragma once
+
+#include "world.hpp"
+
+#include <skep.hpp>
+#include <string>
+
+/// The wall seen by five cameras.
+skep::Scene made_scene();
+/// Options for a run of a fraction of a second.
+skep::Options quick_options();
+
+void test_library();
+void test_spans();
+void test_options();
+void test_scene();
+void test_moves();
+void test_run(const std::string &folder);
+void test_progress();
+void test_steps_equal_whole();
+void test_states();
+void test_kernels();
+void test_files(const std::string &folder);

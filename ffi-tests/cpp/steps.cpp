@@ -1,0 +1,116 @@
+// Runs taken apart, states, and fusion.
+#include "parts.hpp"
+#include "test.hpp"
+
+/// Takes all steps of all views by hand, as skep.h describes it.
+static std::vector<skep::State> take_all_steps(const skep::Steps &steps) {
+    const std::uint32_t views = MUST(steps.view_count());
+    std::vector<skep::State> states(views);
+    std::optional<std::uint32_t> step = 0;
+    while (step) {
+        const std::uint32_t pixels = [&] {
+            const skep::Size size = MUST(steps.size(*step, 0));
+            return size.width * size.height;
+        }();
+        for (std::uint32_t view = 0; view < views; ++view)
+            if (states[view] && MUST(states[view].info()).pixels < pixels)
+                states[view] = MUST(steps.hand_up(*step, view, states[view]));
+        std::vector<skep::State> found(views), checked(views);
+        for (std::uint32_t view = 0; view < views; ++view) {
+            const skep::Offers offers = MUST(steps.propagate(*step, view, states));
+            found[view] = MUST(steps.search(*step, view, states, offers));
+        }
+        for (std::uint32_t view = 0; view < views; ++view)
+            checked[view] = MUST(steps.check(*step, view, found));
+        states = std::move(checked);
+        step = MUST(steps.next(*step, states));
+    }
+    return states;
+}
+
+void test_steps_equal_whole() {
+    const skep::Scene scene = made_scene();
+    const skep::Options options = quick_options();
+    const skep::Result whole = MUST(skep::reconstruct(scene, options));
+    const skep::Steps steps = MUST(skep::Steps::create(scene, options));
+    CHECK(MUST(steps.step_count()) == 6 && MUST(steps.step(0)).reduction == 2);
+    CHECK(MUST(steps.sources(0)) == MUST(whole.sources(0)));
+
+    const std::vector<skep::State> states = take_all_steps(steps);
+    std::vector<skep::Result> parts;
+    for (std::uint32_t view = 0; view < 5; ++view) {
+        parts.push_back(MUST(steps.finish(view, states)));
+        const skep::Result &part = parts.back();
+        for (skep::Maps which : {skep::Maps::Raw, skep::Maps::Validated}) {
+            CHECK(MUST(part.depth(view, which)).data == MUST(whole.depth(view, which)).data);
+            CHECK(MUST(part.normal(view, which)).data == MUST(whole.normal(view, which)).data);
+        }
+        CHECK(MUST(part.cost(view)).data == MUST(whole.cost(view)).data);
+        CHECK(MUST(part.outcome(view)).data == MUST(whole.outcome(view)).data);
+        CHECK(MUST(part.source_bits(view, 0)).data == MUST(whole.source_bits(view, 0)).data);
+    }
+    FAILS(SKEP_ERR_ARGUMENT, "single view", parts[0].cloud());
+
+    // Their validated maps fuse to the same points.
+    std::vector<skep::Map<float>> depths, normals;
+    std::vector<std::vector<std::uint8_t>> pictures;
+    std::vector<skep::FusionView> views;
+    for (std::uint32_t view = 0; view < 5; ++view) {
+        depths.push_back(MUST(parts[view].depth(view, skep::Maps::Validated)));
+        normals.push_back(MUST(parts[view].normal(view, skep::Maps::Validated)));
+        const skep_camera camera = MUST(scene.camera(view));
+        pictures.push_back(world::picture(camera, world::width, world::height));
+        views.push_back({camera, MUST(skep::look<float>(depths.back())),
+                         MUST(skep::look<float>(normals.back(), 3)), MUST(scene.overlap(view)),
+                         skep_image{pictures.back().data(), world::width, world::height,
+                                    world::width, SKEP_FORMAT_GREY}});
+    }
+    const skep::Points by_hand = MUST(MUST(skep::fuse(views, options)).points());
+    const skep::Points by_run = MUST(MUST(whole.cloud()).points());
+    CHECK(by_hand.positions == by_run.positions && by_hand.colours == by_run.colours);
+    CHECK(by_hand.normals == by_run.normals);
+
+    FAILS(SKEP_ERR_CANCELLED, "",
+          skep::fuse(views, options, [](const skep::Progress &) { return skep::Flow::Cancel; }));
+    views[2].normal.width -= 1;
+    FAILS(SKEP_ERR_ARGUMENT, "views[2].normal is 55 x 42", skep::fuse(views, options));
+}
+
+void test_states() {
+    const skep::Steps steps = MUST(skep::Steps::create(made_scene(), quick_options()));
+    const std::vector<skep::State> none(5);
+    const skep::State found = MUST(steps.search(0, 2, none));
+    const skep_state_info info = MUST(found.info());
+    CHECK(info.view == 2 && info.pixels == 28 * 21 && info.is_checked == 0);
+    CHECK(MUST(steps.search(0, 2, {})) && !none[0]);
+    FAILS(SKEP_ERR_NULL, "state", none[0].info());
+    FAILS(SKEP_ERR_CANCELLED, "",
+          steps.search(0, 2, none, skep::Offers(),
+                       [](const skep::Progress &) { return skep::Flow::Cancel; }));
+
+    // As bytes and back: the same maps.
+    const std::vector<std::uint8_t> bytes = MUST(found.save());
+    const skep::State::Content maps = MUST(found.maps());
+    const skep::State::Content loaded = MUST(MUST(steps.load(bytes)).maps());
+    CHECK(loaded.depth == maps.depth && loaded.normal == maps.normal && loaded.cost == maps.cost);
+    FAILS(SKEP_ERR_ARGUMENT, "bytes", steps.load({bytes.data(), bytes.size() - 1}));
+
+    // From maps: what is given is there, and what has a depth counts as validated unless told
+    // otherwise.
+    const skep::Size size = MUST(steps.size(0, 2));
+    skep::Map<float> depth(size), normal(size, 3);
+    depth.at(3, 2) = 5, normal.at(3, 2, 2) = -1;
+    depth.at(4, 2) = 6, normal.at(4, 2, 2) = -1;
+    const std::size_t place = 2 * 28 + 3;
+    const skep::State given = MUST(steps.state_from_maps(0, 2, depth, normal));
+    const skep::State::Content content = MUST(given.maps());
+    CHECK(MUST(given.info()).is_checked == 1 && MUST(given.info()).validated == 2);
+    CHECK(content.depth[place] == 5 && content.depth[place + 2] == 0);
+    skep::Map<std::uint8_t> validated(size);
+    validated.at(4, 2) = 1;
+    const skep::State doubted = MUST(steps.state_from_maps(0, 2, depth, normal, validated));
+    CHECK(MUST(doubted.maps()).validated[place] == 0 && MUST(doubted.info()).validated == 1);
+    FAILS(SKEP_ERR_ARGUMENT, "normal", steps.state_from_maps(0, 2, depth, depth));
+    FAILS(SKEP_ERR_ARGUMENT, "28 x 21",
+          steps.state_from_maps(0, 2, skep::Map<float>({9, 9}), normal));
+}

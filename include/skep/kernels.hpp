@@ -1,0 +1,108 @@
+// Homographies of planes, and patch correlation. Part of skep.hpp.
+#ifndef SKEP_KERNELS_HPP
+#define SKEP_KERNELS_HPP
+
+#include "object.hpp"
+#include "shapes.hpp"
+
+namespace skep {
+inline namespace SKEP_FLAVOUR {
+
+/// Row by row, so that (x', y', 1) ~ H (x, y, 1).
+using Homography = std::array<double, 9>;
+/// Column and row.
+using Pixel = std::array<std::uint32_t, 2>;
+static_assert(sizeof(Homography) == 72 && sizeof(Pixel) == 8,
+              "arrays without gaps, as the kernels take them");
+
+/// A homography from a matrix of Eigen or OpenCV.
+template <class M> Fallible<Homography> homography(const M &matrix) {
+    Homography out = {};
+    detail::Outcome outcome = detail::read(matrix, 3, 3, "homography", out.data());
+    return detail::give(std::move(outcome), out);
+}
+
+/// Writes a homography into a matrix of Eigen or OpenCV; a cv::Mat becomes one of doubles.
+template <class M> void assign(const Homography &homography, M &matrix) {
+    if constexpr (detail::CanResize<M>::value && detail::IsCalled<M>::value) matrix.resize(3, 3);
+    else if constexpr (detail::CanCreate<M>::value) matrix.create(3, 3, detail::cv_depth<double>());
+    for (int i = 0; i < 9; ++i) {
+        if constexpr (detail::IsCalled<M>::value)
+            matrix(i / 3, i % 3) =
+                static_cast<detail::Plain<decltype(matrix(0, 0))>>(homography[std::size_t(i)]);
+        else
+            reinterpret_cast<double *>(matrix.data +
+                                       std::size_t(matrix.step) * std::size_t(i / 3))[i % 3] =
+                homography[std::size_t(i)];
+    }
+}
+
+/// The plane with this unit normal, a vector of three, through the point at `depth` behind a pixel.
+template <class Normal>
+Fallible<skep_plane> plane_through(const skep_camera &camera, double x, double y, double depth,
+                                   const Normal &normal) {
+    skep_plane plane = {};
+    double unit[3] = {};
+    detail::Outcome outcome = detail::read_vector(normal, "normal", unit).then([&] {
+        return skep_plane_through(&camera, x, y, depth, unit, &plane);
+    });
+    return detail::give(std::move(outcome), plane);
+}
+
+/// The homographies that planes induce from pixels of one camera to pixels of another.
+inline Fallible<std::vector<Homography>> plane_homographies(const skep_camera &reference,
+                                                            const skep_camera &source,
+                                                            Span<const skep_plane> planes) {
+    std::vector<Homography> out(planes.size());
+    return detail::give(skep_plane_homographies(&reference, &source, planes.data(), planes.size(),
+                                                out.empty() ? nullptr : out.front().data()),
+                        out);
+}
+
+/// A grey image in the layout the kernels sample.
+class Samples : public detail::Handle<skep_samples, skep_samples_destroy> {
+  public:
+    using Handle::Handle;
+    template <class Image> static Fallible<Samples> create(const Image &picture) {
+        Samples samples;
+        skep_image image = {};
+        detail::Outcome outcome = detail::look_at_image(picture, false, "picture", image).then([&] {
+            return skep_samples_create(&image, samples.put());
+        });
+        return detail::give(std::move(outcome), samples);
+    }
+};
+
+/// Where patches are sampled and how samples are weighted.
+class Window : public detail::Handle<skep_window, skep_window_destroy> {
+  public:
+    using Handle::Handle;
+    static Fallible<Window> create(std::uint32_t radius, std::uint32_t step, double spatial_sigma,
+                                   double colour_sigma, double min_variance = 1e-5) {
+        Window window;
+        return detail::give(skep_window_create(radius, step, spatial_sigma, colour_sigma,
+                                               min_variance, window.put()),
+                            window);
+    }
+};
+
+/// Correlates the patch at each pixel with its image under the homography of the same place, into
+/// memory of the caller's. Allocates nothing.
+inline Fallible<void> patch_ncc(const Window &window, const Samples &reference,
+                                const Samples &source, Span<const Pixel> pixels,
+                                Span<const Homography> homographies, Span<float> ncc) {
+    if (homographies.size() != pixels.size() || ncc.size() != pixels.size())
+        return detail::give(detail::Outcome::argument(
+            "homographies and ncc",
+            std::to_string(homographies.size()) + " and " + std::to_string(ncc.size()) + " long",
+            std::to_string(pixels.size()) + " as the pixels"));
+    const bool any = !pixels.empty();
+    return detail::give(skep_patch_ncc(
+        window.get(), reference.get(), source.get(), any ? pixels.data()->data() : nullptr,
+        any ? homographies.data()->data() : nullptr, pixels.size(), ncc.data()));
+}
+
+} // namespace SKEP_FLAVOUR
+} // namespace skep
+
+#endif // SKEP_KERNELS_HPP

@@ -1,0 +1,189 @@
+// Options and scenes. Part of skep.hpp.
+#ifndef SKEP_SCENE_HPP
+#define SKEP_SCENE_HPP
+
+#include "object.hpp"
+#include "shapes.hpp"
+
+namespace skep {
+inline namespace SKEP_FLAVOUR {
+
+/// Every number the method depends on.
+class Options : public detail::Handle<skep_options, skep_options_destroy> {
+  public:
+    using Handle::Handle;
+#ifndef SKEP_NO_EXCEPTIONS
+    explicit Options(const char *preset = "default") : Options(create(preset)) {}
+#endif
+    static Fallible<Options> create(const char *preset = "default") {
+        Options options(static_cast<skep_options *>(nullptr));
+        return detail::give(skep_options_create(preset, options.put()), options);
+    }
+    Fallible<void> set(const char *name, double value) {
+        return detail::give(skep_options_set(get(), name, value));
+    }
+    Fallible<double> get(const char *name) const {
+        double value = 0;
+        return detail::give(skep_options_get(get(), name, &value), value);
+    }
+    Fallible<void> set_seed(std::uint64_t seed) {
+        return detail::give(skep_options_set_seed(get(), seed));
+    }
+    /// nullptr is the best the machine has.
+    Fallible<void> set_simd(const char *level) {
+        return detail::give(skep_options_set_simd(get(), level));
+    }
+    Fallible<void> set_scales(Span<const skep_scale> scales) {
+        return detail::give(skep_options_set_scales(get(), scales.data(), scales.size()));
+    }
+    Fallible<std::vector<skep_scale>> scales() const {
+        return detail::list<skep_scale>(
+            [&](auto... out) { return skep_options_get_scales(get(), out...); });
+    }
+    /// The names of all options that are numbers.
+    static std::vector<std::string> names() {
+        std::vector<std::string> names;
+        while (const char *name = skep_option_name(names.size()))
+            names.emplace_back(name);
+        return names;
+    }
+    using Handle::get;
+};
+
+/// Options, or none for the default.
+class OptionsOrDefault {
+  public:
+    OptionsOrDefault() = default;
+    OptionsOrDefault(const Options &options) : raw_(options.get()), is_empty_(!options) {}
+    const skep_options *get() const noexcept { return raw_; }
+    /// Options that were moved from are not the default.
+    detail::Outcome check() const {
+        return is_empty_ ? detail::Outcome::argument("options", "empty",
+                                                     "options that were not moved from")
+                         : detail::Outcome();
+    }
+
+  private:
+    const skep_options *raw_ = nullptr;
+    bool is_empty_ = false;
+};
+
+struct Range {
+    double near_depth = 0, far_depth = 0;
+};
+
+/// Calibrated photographs and sparse points.
+class Scene : public detail::Handle<skep_scene, skep_scene_destroy> {
+  public:
+    using Handle::Handle;
+#ifndef SKEP_NO_EXCEPTIONS
+    Scene() : Scene(create()) {}
+#endif
+    static Fallible<Scene> create() {
+        Scene scene(nullptr);
+        return detail::give(skep_scene_create(scene.put()), scene);
+    }
+    /// (0, 0) takes the depth ranges from the sparse points.
+    static Fallible<Scene> read_colmap(const std::string &folder, Range range = {}) {
+        Scene scene(nullptr);
+        return detail::give(
+            skep_scene_read_colmap(folder.c_str(), range.near_depth, range.far_depth, scene.put()),
+            scene);
+    }
+    Fallible<void> write_colmap(const std::string &folder) const {
+        return detail::give(skep_scene_write_colmap(get(), folder.c_str()));
+    }
+
+    /// Adds a picture, which is copied, and returns its number. Colours are in OpenCV's order
+    /// unless skep::image says otherwise.
+    template <class Image>
+    Fallible<std::uint32_t> add_view(const Image &picture, const skep_camera &camera,
+                                     const char *name = nullptr) {
+        std::uint32_t view = 0;
+        skep_image image = {};
+        detail::Outcome outcome = detail::look_at_image(picture, false, "picture", image).then([&] {
+            return skep_scene_add_view(get(), name, &image, &camera, &view);
+        });
+        return detail::give(std::move(outcome), view);
+    }
+    /// A mask of the view's size, 8 bits a pixel, 0 where no depth is wanted.
+    template <class Mask> Fallible<void> set_mask(std::uint32_t view, const Mask &mask) {
+        MapView<const std::uint8_t> map;
+        Size size;
+        return detail::give(
+            detail::look<const std::uint8_t>(mask, 1, "mask", map)
+                .then([&] {
+                    return skep_scene_get_view(get(), view, &size.width, &size.height, nullptr);
+                })
+                .then([&] { return detail::make<const std::uint8_t>(map, size, 1, "mask", map); })
+                .then(
+                    [&] { return skep_scene_set_mask(get(), view, map.data, map.stride_bytes); }));
+    }
+    Fallible<void> clear_mask(std::uint32_t view) {
+        return detail::give(skep_scene_set_mask(get(), view, nullptr, 0));
+    }
+    Fallible<void> set_depth_range(std::uint32_t view, Range range) {
+        return detail::give(
+            skep_scene_set_depth_range(get(), view, range.near_depth, range.far_depth));
+    }
+    Fallible<void> set_sources(std::uint32_t view, Span<const std::uint32_t> sources) {
+        return detail::give(skep_scene_set_sources(get(), view, sources.data(), sources.size()));
+    }
+    /// x, y, z of each point; how many views saw it; and which, point after point.
+    Fallible<void> add_points(Span<const double> positions, Span<const std::uint32_t> view_counts,
+                              Span<const std::uint32_t> views) {
+        if (positions.size() != 3 * view_counts.size())
+            return detail::give(
+                detail::Outcome::argument("positions", std::to_string(positions.size()) + " long",
+                                          std::to_string(3 * view_counts.size())));
+        return detail::give(skep_scene_add_points(get(), positions.data(), view_counts.size(),
+                                                  view_counts.data(), views.data(), views.size()));
+    }
+    Fallible<void> validate() const { return detail::give(skep_scene_validate(get())); }
+    Fallible<std::uint32_t> view_count() const {
+        std::uint32_t count = 0;
+        return detail::give(skep_scene_view_count(get(), &count), count);
+    }
+    Fallible<Size> size(std::uint32_t view) const {
+        Size size;
+        return detail::give(skep_scene_get_view(get(), view, &size.width, &size.height, nullptr),
+                            size);
+    }
+    Fallible<skep_camera> camera(std::uint32_t view) const {
+        skep_camera camera = {};
+        return detail::give(skep_scene_get_view(get(), view, nullptr, nullptr, &camera), camera);
+    }
+    Fallible<std::string> name(std::uint32_t view) const {
+        std::string name;
+        detail::Outcome outcome = detail::text(
+            name, [&](auto... out) { return skep_scene_get_name(get(), view, out...); });
+        return detail::give(std::move(outcome), name);
+    }
+    Fallible<Range> depth_range(std::uint32_t view) const {
+        Range range;
+        return detail::give(
+            skep_scene_get_depth_range(get(), view, &range.near_depth, &range.far_depth), range);
+    }
+    Fallible<std::vector<std::uint32_t>> sources(std::uint32_t view,
+                                                 OptionsOrDefault options = {}) const {
+        return detail::list<std::uint32_t>([&](auto... out) {
+            return options.check().then(
+                [&] { return skep_scene_get_sources(get(), options.get(), view, out...); });
+        });
+    }
+    Fallible<std::vector<std::uint32_t>> overlap(std::uint32_t view) const {
+        return detail::list<std::uint32_t>(
+            [&](auto... out) { return skep_scene_get_overlap(get(), view, out...); });
+    }
+    /// In degrees; -1 when the views see nothing together.
+    Fallible<double> triangulation_angle(std::uint32_t reference, std::uint32_t source) const {
+        double degrees = 0;
+        return detail::give(skep_scene_triangulation_angle(get(), reference, source, &degrees),
+                            degrees);
+    }
+};
+
+} // namespace SKEP_FLAVOUR
+} // namespace skep
+
+#endif // SKEP_SCENE_HPP
