@@ -43,19 +43,21 @@ void test_kernels() {
     const skep::Window window = MUST(skep::Window::create(5, 1, all_alike, all_alike));
     const skep::Homography identity = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     const std::vector<skep::Pixel> pixels = {{20, 17}, {20, 17}};
-    const std::vector<skep::Homography> ways = {h, identity};
+    const skep::Homography shift = {1, 0, 4, 0, 1, 0, 0, 0, 1};
+    const std::vector<skep::Homography> ways = {h, shift};
     std::vector<float> ncc(2);
     MUST(skep::patch_ncc(window, reference_samples, source_samples, pixels, ways, ncc));
-    CHECK(ncc[0] > 0.97f && ncc[1] < 0.9f);
-    MUST(skep::patch_ncc(window, reference_samples, reference_samples, pixels, ways, ncc));
-    CHECK(std::abs(ncc[1] - 1) < 1e-5f);
+    CHECK(ncc[0] > 0.99f && ncc[1] < 0.5f);
+    const std::vector<skep::Homography> same = {identity, identity};
+    MUST(skep::patch_ncc(window, reference_samples, reference_samples, pixels, same, ncc));
+    CHECK(std::abs(ncc[0] - 1) < 1e-5f && ncc[0] == ncc[1]);
     MUST(skep::patch_ncc(window, reference_samples, source_samples, {}, {}, {}));
 
     FAILS(
         SKEP_ERR_ARGUMENT, "2 as the pixels",
         skep::patch_ncc(window, reference_samples, source_samples, pixels, ways, {ncc.data(), 1}));
     FAILS(SKEP_ERR_ARGUMENT, "radius", skep::Window::create(99, 1, 1, 1));
-    FAILS(SKEP_ERR_ARGUMENT, "depth",
+    FAILS(SKEP_ERR_ARGUMENT, "distance",
           skep::plane_through(reference, 1, 1, -2, world::Vector{0, 0, -1}));
     FAILS(SKEP_ERR_ARGUMENT, "normal is 2 long; expected 3",
           skep::plane_through(reference, 1, 1, 2, std::vector<double>{0, -1}));
