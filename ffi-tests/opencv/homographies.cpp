@@ -1,4 +1,5 @@
-// The homographies of planes against OpenCV's projections, its estimate from points, and its warping.
+// The homographies of planes against OpenCV's projections, its estimate from points, and its
+// warping.
 #include "../cpp/world.hpp"
 #include "pictures.hpp"
 
@@ -36,7 +37,8 @@ static void test_against_projections() {
     const skep_camera reference = world::camera(0.3, width, height);
     std::vector<cv::Point2d> pixels;
     for (int y = 0; y < height; y += 17)
-        for (int x = 0; x < width; x += 13) pixels.emplace_back(x + 0.25, y - 0.5);
+        for (int x = 0; x < width; x += 13)
+            pixels.emplace_back(x + 0.25, y - 0.5);
     cv::RNG random(1);
     double most = 0, most_found = 0;
     for (int round = 0; round < 50; ++round) {
@@ -54,19 +56,23 @@ static void test_against_projections() {
         for (std::size_t i = 0; i < pixels.size(); ++i) {
             const cv::Point2d ours = apply(h, pixels[i].x, pixels[i].y);
             most = std::max(most, cv::norm(ours - places[i]));
-            most_found = std::max(most_found, cv::norm(ours - apply(found, pixels[i].x, pixels[i].y)));
+            most_found =
+                std::max(most_found, cv::norm(ours - apply(found, pixels[i].x, pixels[i].y)));
         }
     }
-    std::printf("homographies: at most %.1e px from cv::projectPoints, %.1e px from cv::findHomography\n",
-                most, most_found);
+    std::printf(
+        "homographies: at most %.1e px from cv::projectPoints, %.1e px from cv::findHomography\n",
+        most, most_found);
     CHECK(most < 1e-6);
-    // cv::findHomography takes points in single precision: places up to 256 px are rounded by up to 2^-17 px.
+    // cv::findHomography takes points in single precision: places up to 256 px are rounded by up to
+    // 2^-17 px.
     CHECK(most_found < std::ldexp(1, -17));
 }
 
 /// H takes reference pixels to source pixels, so cv::warpPerspective takes it as an inverse map.
 static void test_against_warp() {
-    const skep_camera reference = world::camera(0, width, height), source = world::camera(0.8, width, height);
+    const skep_camera reference = world::camera(0, width, height),
+                      source = world::camera(0.8, width, height);
     const skep_plane wall = skep::plane_through(reference, 70, 50, world::depth(reference, 70, 50),
                                                 world::normal(reference));
     const skep::Homography h =
@@ -76,17 +82,19 @@ static void test_against_warp() {
     const cv::Mat seen(height, width, CV_8U, const_cast<std::uint8_t *>(source_pixels.data()));
     cv::Mat matrix, warped;
     skep::assign(h, matrix);
-    cv::warpPerspective(seen, warped, matrix, {width, height}, cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
-                        cv::BORDER_REPLICATE);
+    cv::warpPerspective(seen, warped, matrix, {width, height},
+                        cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
 
-    // The exact warp by H may differ by the rounding of places and, half a grey, of the result; weights have 15 bits.
+    // The exact warp by H may differ by the rounding of places and, half a grey, of the result;
+    // weights have 15 bits.
     double most = 0, from_exact = 0, from_truth = 0, unwarped = 0;
     int inside = 0;
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
             const cv::Point2d at = apply(h, x, y);
             if (at.x < 1 || at.y < 1 || at.x > width - 2 || at.y > height - 2) continue;
-            const int grey = warped.at<std::uint8_t>(y, x), truth = reference_pixels[std::size_t(y * width + x)];
+            const int grey = warped.at<std::uint8_t>(y, x),
+                      truth = reference_pixels[std::size_t(y * width + x)];
             const double difference = std::abs(grey - sample(seen, at));
             CHECK(difference <= rounding_bound(seen, at) + 0.51);
             most = std::max(most, difference), from_exact += difference;
@@ -95,7 +103,8 @@ static void test_against_warp() {
             ++inside;
         }
     }
-    std::printf("warps: from the exact warp %.3f greys in the mean, %.2f at most; from what the camera sees %.2f, "
+    std::printf("warps: from the exact warp %.3f greys in the mean, %.2f at most; from what the "
+                "camera sees %.2f, "
                 "without warping %.2f (%d pixels)\n",
                 from_exact / inside, most, from_truth / inside, unwarped / inside, inside);
     CHECK(inside > width * height / 2);

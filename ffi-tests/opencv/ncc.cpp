@@ -31,7 +31,8 @@ static Differences compare(const cv::Mat &reference, const cv::Mat &source, int 
                     homographies, ncc);
 
     const int side = 2 * radius / step + 1;
-    cv::Mat real_source, patch(side, side, CV_32F), map_x = patch.clone(), map_y = patch.clone(), seen, result;
+    cv::Mat real_source, patch(side, side, CV_32F), map_x = patch.clone(), map_y = patch.clone(),
+                                                    seen, result;
     source.convertTo(real_source, CV_32F); // so that results are not rounded to whole greys
     Differences out;
     for (std::size_t i = 0; i < pixels.size(); ++i) {
@@ -43,7 +44,8 @@ static Differences compare(const cv::Mat &reference, const cv::Mat &source, int 
                 const cv::Point2d at = apply(homographies[i], x, y);
                 own.at<double>(row, column) = reference.at<std::uint8_t>(y, x);
                 patch.at<float>(row, column) = reference.at<std::uint8_t>(y, x);
-                map_x.at<float>(row, column) = float(at.x), map_y.at<float>(row, column) = float(at.y);
+                map_x.at<float>(row, column) = float(at.x),
+                                     map_y.at<float>(row, column) = float(at.y);
                 exact.at<double>(row, column) = sample(source, at);
                 error.at<double>(row, column) = rounding_bound(source, at);
             }
@@ -52,8 +54,8 @@ static Differences compare(const cv::Mat &reference, const cv::Mat &source, int 
         cv::matchTemplate(seen, patch, result, cv::TM_CCOEFF_NORMED);
         own -= cv::mean(own)[0], exact -= cv::mean(exact)[0];
         const double expected = own.dot(exact) / (cv::norm(own) * cv::norm(exact));
-        // Unit vectors change by at most twice the relative change of what they are made from, and so does their
-        // product with another; 1e-4 more is for the single precision of both sides.
+        // Unit vectors change by at most twice the relative change of what they are made from, and
+        // so does their product with another; 1e-4 more is for the single precision of both sides.
         const double bound = 2 * cv::norm(error) / cv::norm(exact) + 1e-4;
         const double difference = std::abs(double(ncc[i]) - result.at<float>(0, 0));
         CHECK(difference <= bound);
@@ -80,9 +82,11 @@ int main() {
     }
     for (int step : {1, 2}) {
         const Differences found = compare(reference, source, step, pixels, homographies);
-        std::printf("ncc, step %d: at most %.1e from doubles; from OpenCV %.1e in the mean, %.1e at most, where "
+        std::printf("ncc, step %d: at most %.1e from doubles; from OpenCV %.1e in the mean, %.1e "
+                    "at most, where "
                     "rounding places to 1/32 px allows up to %.1e\n",
-                    step, found.from_exact, found.mean_from_opencv, found.from_opencv, found.largest_bound);
+                    step, found.from_exact, found.mean_from_opencv, found.from_opencv,
+                    found.largest_bound);
         CHECK(found.from_exact < 1e-4);
         CHECK(found.mean_from_opencv < 2e-3);
     }

@@ -1,4 +1,5 @@
-// What the tests against OpenCV share: pictures made in code, and their exact arithmetic in doubles.
+// What the tests against OpenCV share: pictures made in code, and their exact arithmetic in
+// doubles.
 #pragma once
 
 #include "../cpp/test.hpp"
@@ -37,17 +38,21 @@ inline double sample(const cv::Mat &picture, cv::Point2d at) {
            low * ((1 - right) * below[0] + right * below[1]);
 }
 
-/// The most a bilinear sample can change when its place is rounded to 1/32 of a pixel, as OpenCV's fixed-point
-/// interpolation does: half of that in each axis, times the steepest slopes around.
+/// The most a bilinear sample can change when its place is rounded to 1/32 of a pixel, as OpenCV's
+/// fixed-point interpolation does: half of that in each axis, times the steepest slopes around.
 inline double rounding_bound(const cv::Mat &picture, cv::Point2d at) {
-    const int left = std::max(int(std::floor(at.x)) - 1, 0), top = std::max(int(std::floor(at.y)) - 1, 0);
-    const int right = std::min(left + 3, picture.cols - 1), bottom = std::min(top + 3, picture.rows - 1);
+    const int left = std::max(int(std::floor(at.x)) - 1, 0),
+              top = std::max(int(std::floor(at.y)) - 1, 0);
+    const int right = std::min(left + 3, picture.cols - 1),
+              bottom = std::min(top + 3, picture.rows - 1);
     int across = 0, down = 0;
     for (int y = top; y <= bottom; ++y) {
         for (int x = left; x <= right; ++x) {
             const int grey = picture.at<std::uint8_t>(y, x);
-            if (x < right) across = std::max(across, std::abs(picture.at<std::uint8_t>(y, x + 1) - grey));
-            if (y < bottom) down = std::max(down, std::abs(picture.at<std::uint8_t>(y + 1, x) - grey));
+            if (x < right)
+                across = std::max(across, std::abs(picture.at<std::uint8_t>(y, x + 1) - grey));
+            if (y < bottom)
+                down = std::max(down, std::abs(picture.at<std::uint8_t>(y + 1, x) - grey));
         }
     }
     return (across + down) / 64.0;

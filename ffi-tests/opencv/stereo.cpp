@@ -8,7 +8,8 @@ static constexpr int width = 288, height = 216, most_disparity = 64;
 static constexpr double focal = 260, baseline = 0.2, cx = 143.5, cy = 107.5;
 static const double infinity = std::numeric_limits<double>::infinity();
 
-/// Grey of a surface at a place on it: random numbers at the corners of grids of several widths, blended.
+/// Grey of a surface at a place on it: random numbers at the corners of grids of several widths,
+/// blended.
 static double grey(double u, double v, int surface) {
     double sum = 0;
     for (int octave = 0; octave < 4; ++octave) {
@@ -32,7 +33,8 @@ struct Hit {
     double depth = infinity, grey = 0;
 };
 
-/// What a ray meets first, from (x, 0, 0) towards (a, b, 1): a back wall, a floor, a slanted board and two balls.
+/// What a ray meets first, from (x, 0, 0) towards (a, b, 1): a back wall, a floor, a slanted board
+/// and two balls.
 static Hit look(double x, double a, double b) {
     Hit hit;
     const auto plane = [&](int surface, cv::Vec3d normal, double offset, auto inside) {
@@ -52,7 +54,8 @@ static Hit look(double x, double a, double b) {
     const auto everywhere = [](double, double) { return true; };
     plane(0, {0.25, 0.05, 1}, 4.5, everywhere);
     plane(1, {0, 1, 0.15}, 1.25, everywhere);
-    plane(2, {-0.9, 0.1, 1}, 2.7, [](double u, double v) { return std::abs(u + 0.55) < 0.3 && std::abs(v + 0.1) < 0.5; });
+    plane(2, {-0.9, 0.1, 1}, 2.7,
+          [](double u, double v) { return std::abs(u + 0.55) < 0.3 && std::abs(v + 0.1) < 0.5; });
     ball(3, {0.5, 0.15, 2.2}, 0.35);
     ball(4, {0.05, -0.45, 3.0}, 0.25);
     return hit;
@@ -84,8 +87,10 @@ static cv::Mat true_disparities() {
             const double b = (row - cy) / focal;
             const double disparity = focal * baseline / look(0, (column - cx) / focal, b).depth;
             const double there = column - disparity;
-            const double seen = look(baseline, (there - cx) / focal, b).depth * disparity / (focal * baseline);
-            if (there >= 0 && std::abs(seen - 1) < 1e-3) out.at<float>(row, column) = float(disparity);
+            const double seen =
+                look(baseline, (there - cx) / focal, b).depth * disparity / (focal * baseline);
+            if (there >= 0 && std::abs(seen - 1) < 1e-3)
+                out.at<float>(row, column) = float(disparity);
         }
     }
     return out;
@@ -94,7 +99,8 @@ static cv::Mat true_disparities() {
 struct Scores {
     /// In pixels, where both have a disparity.
     double mean = 0;
-    /// More than one pixel off, where both have a disparity; and everywhere there is truth, where none is off too.
+    /// More than one pixel off, where both have a disparity; and everywhere there is truth, where
+    /// none is off too.
     double off = 0, off_or_none = 0;
 };
 
@@ -103,7 +109,8 @@ static Scores score(const cv::Mat &truth, const cv::Mat &disparity, const cv::Ma
     int both = 0, all = 0;
     for (int row = 0; row < height; ++row) {
         for (int column = 0; column < width; ++column) {
-            const float right = truth.at<float>(row, column), found = disparity.at<float>(row, column);
+            const float right = truth.at<float>(row, column),
+                        found = disparity.at<float>(row, column);
             if (right == 0) continue;
             const double error = std::abs(found - right);
             ++all, scores.off_or_none += found <= 0 || error > 1;
@@ -118,11 +125,12 @@ static Scores score(const cv::Mat &truth, const cv::Mat &disparity, const cv::Ma
 /// Raw and validated disparities of the left view.
 static std::array<cv::Mat, 2> our_disparities(const cv::Mat &left, const cv::Mat &right) {
     skep::Scene scene;
-    // The method matches no pixel with a single source view. Each photograph is therefore given twice: what is known
-    // of the scene is still the pair.
+    // The method matches no pixel with a single source view. Each photograph is therefore given
+    // twice: what is known of the scene is still the pair.
     for (int view = 0; view < 4; ++view) {
         const bool is_left = view % 2 == 0;
-        const skep_camera camera = {focal, focal, cx, cy, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {is_left ? 0 : -baseline, 0, 0}};
+        const skep_camera camera = {
+            focal, focal, cx, cy, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {is_left ? 0 : -baseline, 0, 0}};
         const std::uint32_t number = scene.add_view(is_left ? left : right, camera);
         const std::array<std::uint32_t, 2> others = {is_left ? 1u : 0u, is_left ? 3u : 2u};
         scene.set_sources(number, others);
@@ -134,26 +142,31 @@ static std::array<cv::Mat, 2> our_disparities(const cv::Mat &left, const cv::Mat
     std::array<cv::Mat, 2> out;
     for (std::size_t i = 0; i < 2; ++i) {
         result.depth(0, i == 0 ? skep::Maps::Raw : skep::Maps::Validated, out[i]);
-        for (float &value : cv::Mat_<float>(out[i])) value = value > 0 ? float(focal * baseline) / value : 0;
+        for (float &value : cv::Mat_<float>(out[i]))
+            value = value > 0 ? float(focal * baseline) / value : 0;
     }
     return out;
 }
 
-/// Disparities of cv::StereoSGBM, 0 for none. The pair is widened so that it searches the left border too.
-static cv::Mat their_disparities(const cv::Mat &left, const cv::Mat &right, int block, int mode, int uniqueness,
-                                 int speckle) {
+/// Disparities of cv::StereoSGBM, 0 for none. The pair is widened so that it searches the left
+/// border too.
+static cv::Mat their_disparities(const cv::Mat &left, const cv::Mat &right, int block, int mode,
+                                 int uniqueness, int speckle) {
     cv::Mat wide_left, wide_right, fixed, out;
     cv::copyMakeBorder(left, wide_left, 0, 0, most_disparity, 0, cv::BORDER_REPLICATE);
     cv::copyMakeBorder(right, wide_right, 0, 0, most_disparity, 0, cv::BORDER_REPLICATE);
     const int area = block * block;
-    cv::StereoSGBM::create(0, most_disparity, block, 8 * area, 32 * area, 1, 31, uniqueness, speckle, 2, mode)
+    cv::StereoSGBM::create(0, most_disparity, block, 8 * area, 32 * area, 1, 31, uniqueness,
+                           speckle, 2, mode)
         ->compute(wide_left, wide_right, fixed);
-    fixed.colRange(most_disparity, fixed.cols).convertTo(out, CV_32F, 1.0 / cv::StereoMatcher::DISP_SCALE);
+    fixed.colRange(most_disparity, fixed.cols)
+        .convertTo(out, CV_32F, 1.0 / cv::StereoMatcher::DISP_SCALE);
     return cv::max(out, 0);
 }
 
 int main() {
-    const cv::Mat left = photograph(0, 1), right = photograph(baseline, 2), truth = true_disparities();
+    const cv::Mat left = photograph(0, 1), right = photograph(baseline, 2),
+                  truth = true_disparities();
     const auto [raw, validated] = our_disparities(left, right);
     std::printf("%-34s %22s %22s\n", "", "both define, > 1 px", "> 1 px or none");
     // Its best settings, chosen for each number by itself, after the fact.
@@ -161,12 +174,17 @@ int main() {
     for (int mode : {cv::StereoSGBM::MODE_SGBM, cv::StereoSGBM::MODE_HH}) {
         for (int block : {3, 5, 7}) {
             for (int uniqueness : {0, 10}) {
-                const cv::Mat theirs = their_disparities(left, right, block, mode, uniqueness, uniqueness * 10);
-                const Scores their = score(truth, theirs, validated), our = score(truth, validated, theirs);
+                const cv::Mat theirs =
+                    their_disparities(left, right, block, mode, uniqueness, uniqueness * 10);
+                const Scores their = score(truth, theirs, validated),
+                             our = score(truth, validated, theirs);
                 const Scores our_raw = score(truth, raw, theirs);
-                std::printf("SGBM %s block %d uniqueness %2d: mean %.3f px (ours %.3f, raw %.3f), off %.2f %% (ours %.2f %%), off or none "
-                            "%.2f %%\n", mode == cv::StereoSGBM::MODE_HH ? "HH" : "  ", block, uniqueness,
-                            their.mean, our.mean, our_raw.mean, 100 * their.off, 100 * our.off, 100 * their.off_or_none);
+                std::printf("SGBM %s block %d uniqueness %2d: mean %.3f px (ours %.3f, raw %.3f), "
+                            "off %.2f %% (ours %.2f %%), off or none "
+                            "%.2f %%\n",
+                            mode == cv::StereoSGBM::MODE_HH ? "HH" : "  ", block, uniqueness,
+                            their.mean, our.mean, our_raw.mean, 100 * their.off, 100 * our.off,
+                            100 * their.off_or_none);
                 best_lead = std::min(best_lead, their.mean - our.mean);
                 best_off_lead = std::min(best_off_lead, their.off - our.off);
                 best_off_or_none = std::min(best_off_or_none, their.off_or_none);

@@ -1,12 +1,13 @@
-// Patches a second beside OpenCV's on one thread: this header's batch against a homography's map, cv::remap and
-// cv::matchTemplate for each patch.
+// Patches a second beside OpenCV's on one thread: this header's batch against a homography's map,
+// cv::remap and cv::matchTemplate for each patch.
 #include "pictures.hpp"
 
 #include <chrono>
 #include <limits>
 
 static constexpr int width = 640, height = 480, radius = 5;
-/// As a search does: several hypotheses of each pixel follow each other, and share the reference's side.
+/// As a search does: several hypotheses of each pixel follow each other, and share the reference's
+/// side.
 static constexpr int hypotheses = 8, patches = 500 * hypotheses, rounds = 9;
 
 template <class Work> static double seconds(Work work) {
@@ -31,7 +32,8 @@ static Batch made_batch() {
         else batch.pixels.push_back(batch.pixels.back());
         const double slant = random.uniform(-0.2, 0.2), shift = random.uniform(-4.0, 4.0);
         const double x = batch.pixels.back()[0];
-        batch.homographies.push_back({1 + slant, 0, shift - slant * x, 0, 1, 0, 1e-5, 0, 1 - 1e-5 * x});
+        batch.homographies.push_back(
+            {1 + slant, 0, shift - slant * x, 0, 1, 0, 1e-5, 0, 1 - 1e-5 * x});
     }
     return batch;
 }
@@ -71,20 +73,25 @@ int main() {
     std::vector<float> ours(patches), theirs(patches);
     for (int step : {2, 1}) {
         const skep::Window window = skep::Window::create(radius, std::uint32_t(step), alike, alike);
-        // The best of rounds that take turns: what else the machine does slows single rounds of either side.
+        // The best of rounds that take turns: what else the machine does slows single rounds of
+        // either side.
         double our_best = 1e9, their_best = 1e9;
         for (int round = 0; round < rounds; ++round) {
             our_best = std::min(our_best, seconds([&] {
-                skep::patch_ncc(window, reference, source, batch.pixels, batch.homographies, ours);
-            }));
-            their_best = std::min(their_best, seconds([&] { correlate_with_opencv(batch, step, theirs); }));
+                                    skep::patch_ncc(window, reference, source, batch.pixels,
+                                                    batch.homographies, ours);
+                                }));
+            their_best =
+                std::min(their_best, seconds([&] { correlate_with_opencv(batch, step, theirs); }));
         }
         const int side = 2 * radius / step + 1;
-        std::printf("%d samples, %s: %.2f million patches/s, OpenCV %.3f million patches/s, ratio %.1f\n",
-                    side * side, skep::backend_name(), patches / our_best / 1e6,
-                    patches / their_best / 1e6, their_best / our_best);
+        std::printf(
+            "%d samples, %s: %.2f million patches/s, OpenCV %.3f million patches/s, ratio %.1f\n",
+            side * side, skep::backend_name(), patches / our_best / 1e6, patches / their_best / 1e6,
+            their_best / our_best);
         double difference = 0;
-        for (std::size_t i = 0; i < patches; ++i) difference += std::abs(ours[i] - theirs[i]) / patches;
+        for (std::size_t i = 0; i < patches; ++i)
+            difference += std::abs(ours[i] - theirs[i]) / patches;
         CHECK(difference < 0.02); // the same work was done
         CHECK(their_best >= 20 * our_best);
     }
