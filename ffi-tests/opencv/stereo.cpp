@@ -1,4 +1,5 @@
 // A rectified pair with exact truth: depths of skep as disparities, beside cv::StereoSGBM's.
+// program SEED
 #include "pictures.hpp"
 
 #include <limits>
@@ -6,6 +7,8 @@
 
 static constexpr int width = 288, height = 216, most_disparity = 64;
 static constexpr double focal = 260, baseline = 0.2, cx = 143.5, cy = 107.5;
+/// Of the surfaces' textures and the photographs' noise.
+static std::uint32_t seed = 0;
 static const double infinity = std::numeric_limits<double>::infinity();
 
 /// Grey of a surface at a place on it: random numbers at the corners of grids of several widths,
@@ -16,7 +19,8 @@ static double grey(double u, double v, int surface) {
         const double x = u * (6 << octave) + 100, y = v * (6 << octave) + 100;
         const auto corner = [&](double column, double row) {
             auto bits = std::uint32_t(column) * 0x9E3779B1u ^ std::uint32_t(row) * 0x85EBCA77u;
-            bits = (bits ^ std::uint32_t(surface * 16 + octave) * 0xC2B2AE3Du) * 0x27D4EB2Fu;
+            bits = (bits ^ (std::uint32_t(surface * 16 + octave) + 1000 * seed) * 0xC2B2AE3Du) *
+                   0x27D4EB2Fu;
             bits = (bits ^ bits >> 15) * 0x2C1B3C6Du;
             return double(bits >> 8) / (1 << 24) - 0.5;
         };
@@ -62,7 +66,7 @@ static Hit look(double x, double a, double b) {
 }
 
 /// A photograph from (x, 0, 0): four rays a pixel, and noise.
-static cv::Mat photograph(double x, std::uint64_t seed) {
+static cv::Mat photograph(double x, std::uint64_t number) {
     cv::Mat out(height, width, CV_32F), noise(height, width, CV_32F);
     for (int row = 0; row < height; ++row) {
         for (int column = 0; column < width; ++column) {
@@ -73,7 +77,7 @@ static cv::Mat photograph(double x, std::uint64_t seed) {
             out.at<float>(row, column) = float(sum / 4);
         }
     }
-    cv::RNG(seed).fill(noise, cv::RNG::NORMAL, 0, 1.5);
+    cv::RNG(10 * seed + number).fill(noise, cv::RNG::NORMAL, 0, 1.5);
     out += noise;
     out.convertTo(out, CV_8U);
     return out;
@@ -138,6 +142,15 @@ static std::array<cv::Mat, 2> our_disparities(const cv::Mat &left, const cv::Mat
     }
     skep::Options options;
     options.set("min_consistent", 1);
+    // Near disparity 10 the default tolerance of 1 % is a tenth of a pixel; that much two views are
+    // not sure of.
+    options.set("depth_tolerance", 0.02);
+    // A pair has no other views to settle edges: the smaller the window, the fewer of its samples
+    // lie beyond them.
+    options.set("window_radius", 3);
+    options.set("window_step", 1);
+    options.set("spatial_sigma", 1.5);
+    options.set("colour_sigma", 0.06);
     const skep::Result result = skep::reconstruct(scene, options);
     std::array<cv::Mat, 2> out;
     for (std::size_t i = 0; i < 2; ++i) {
@@ -164,37 +177,36 @@ static cv::Mat their_disparities(const cv::Mat &left, const cv::Mat &right, int 
     return cv::max(out, 0);
 }
 
-int main() {
+int main(int argc, char **argv) {
+    CHECK(argc == 2);
+    seed = std::uint32_t(std::atoi(argv[1]));
     const cv::Mat left = photograph(0, 1), right = photograph(baseline, 2),
                   truth = true_disparities();
     const auto [raw, validated] = our_disparities(left, right);
-    std::printf("%-34s %22s %22s\n", "", "both define, > 1 px", "> 1 px or none");
-    // Its best settings, chosen for each number by itself, after the fact.
-    double best_lead = infinity, best_off_lead = infinity, best_off_or_none = 1;
+    // Where both have a disparity ours is the validated one. Everywhere, it is the raw one, and
+    // SGBM's is that of its settings that leave the fewest pixels wrong or empty.
+    std::printf("%-28s %-22s %-22s %s\n", "StereoSGBM (skep)", "mean error, both",
+                "over 1 px, both", "over 1 px or none");
+    const double ours = score(truth, raw, raw).off_or_none;
+    double their_best = 1;
     for (int mode : {cv::StereoSGBM::MODE_SGBM, cv::StereoSGBM::MODE_HH}) {
         for (int block : {3, 5, 7}) {
             for (int uniqueness : {0, 10}) {
-                const cv::Mat theirs =
-                    their_disparities(left, right, block, mode, uniqueness, uniqueness * 10);
-                const Scores their = score(truth, theirs, validated),
-                             our = score(truth, validated, theirs);
-                const Scores our_raw = score(truth, raw, theirs);
-                std::printf("SGBM %s block %d uniqueness %2d: mean %.3f px (ours %.3f, raw %.3f), "
-                            "off %.2f %% (ours %.2f %%), off or none "
-                            "%.2f %%\n",
-                            mode == cv::StereoSGBM::MODE_HH ? "HH" : "  ", block, uniqueness,
-                            their.mean, our.mean, our_raw.mean, 100 * their.off, 100 * our.off,
-                            100 * their.off_or_none);
-                best_lead = std::min(best_lead, their.mean - our.mean);
-                best_off_lead = std::min(best_off_lead, their.off - our.off);
-                best_off_or_none = std::min(best_off_or_none, their.off_or_none);
+                const cv::Mat disparity =
+                    their_disparities(left, right, block, mode, uniqueness, 10 * uniqueness);
+                const Scores their = score(truth, disparity, validated);
+                const Scores our = score(truth, validated, disparity);
+                std::printf("%-4s block %d, uniqueness %2d  %.3f px (%.3f px)    %.2f %% (%.2f %%) "
+                            "       %.2f %% (%.2f %%)\n",
+                            mode == cv::StereoSGBM::MODE_HH ? "HH" : "", block, uniqueness,
+                            their.mean, our.mean, 100 * their.off, 100 * our.off,
+                            100 * their.off_or_none, 100 * ours);
+                CHECK(our.mean < their.mean);
+                their_best = std::min(their_best, their.off_or_none);
             }
         }
     }
-    const double ours = score(truth, raw, raw).off_or_none;
-    std::printf("skep: off or none %.2f %% (raw), %.2f %% (validated)\n", 100 * ours,
-                100 * score(truth, validated, validated).off_or_none);
-    CHECK(best_lead > 0);
-    CHECK(best_off_lead > 0);
-    CHECK(ours < best_off_or_none);
+    std::printf("of %d pixels with truth skep validated %.1f %%\n", cv::countNonZero(truth),
+                100.0 * cv::countNonZero((truth > 0) & (validated > 0)) / cv::countNonZero(truth));
+    CHECK(ours < their_best);
 }
