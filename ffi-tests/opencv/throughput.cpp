@@ -6,9 +6,7 @@
 #include <limits>
 
 static constexpr int width = 640, height = 480, radius = 5;
-/// As a search does: several hypotheses of each pixel follow each other, and share the reference's
-/// side.
-static constexpr int hypotheses = 8, patches = 500 * hypotheses, rounds = 9;
+static constexpr int patches = 4096, rounds = 15;
 
 template <class Work> static double seconds(Work work) {
     const auto start = std::chrono::steady_clock::now();
@@ -22,7 +20,8 @@ struct Batch {
     std::vector<skep::Homography> homographies;
 };
 
-static Batch made_batch() {
+/// Hypotheses of the same pixel follow each other, and share the reference's side.
+static Batch made_batch(int hypotheses) {
     Batch batch;
     cv::RNG random(3);
     for (int i = 0; i < patches; ++i) {
@@ -39,12 +38,14 @@ static Batch made_batch() {
 }
 
 static void correlate_with_opencv(const Batch &batch, int step, std::vector<float> &ncc) {
+    skep::Pixel at_work = {};
     const int side = 2 * radius / step + 1;
     cv::Mat map_x(side, side, CV_32F), map_y(side, side, CV_32F);
     cv::Mat patch(side, side, CV_8U), seen, result;
     for (std::size_t i = 0; i < batch.pixels.size(); ++i) {
         const int left = int(batch.pixels[i][0]) - radius, top = int(batch.pixels[i][1]) - radius;
-        if (i % hypotheses == 0) {
+        if (i == 0 || batch.pixels[i] != at_work) {
+            at_work = batch.pixels[i];
             for (int row = 0; row < side; ++row)
                 for (int column = 0; column < side; ++column)
                     patch.at<std::uint8_t>(row, column) =
@@ -64,35 +65,41 @@ static void correlate_with_opencv(const Batch &batch, int step, std::vector<floa
     }
 }
 
-int main() {
-    cv::setNumThreads(1);
-    const Batch batch = made_batch();
+static void compare(int hypotheses, int step) {
+    const Batch batch = made_batch(hypotheses);
     const skep::Samples reference = skep::Samples::create(batch.reference);
     const skep::Samples source = skep::Samples::create(batch.source);
     const double alike = std::numeric_limits<double>::infinity();
+    const skep::Window window = skep::Window::create(radius, std::uint32_t(step), alike, alike);
     std::vector<float> ours(patches), theirs(patches);
-    for (int step : {2, 1}) {
-        const skep::Window window = skep::Window::create(radius, std::uint32_t(step), alike, alike);
-        // The best of rounds that take turns: what else the machine does slows single rounds of
-        // either side.
-        double our_best = 1e9, their_best = 1e9;
-        for (int round = 0; round < rounds; ++round) {
-            our_best = std::min(our_best, seconds([&] {
-                                    skep::patch_ncc(window, reference, source, batch.pixels,
-                                                    batch.homographies, ours);
-                                }));
-            their_best =
-                std::min(their_best, seconds([&] { correlate_with_opencv(batch, step, theirs); }));
-        }
-        const int side = 2 * radius / step + 1;
-        std::printf(
-            "%d samples, %s: %.2f million patches/s, OpenCV %.3f million patches/s, ratio %.1f\n",
-            side * side, skep::backend_name(), patches / our_best / 1e6, patches / their_best / 1e6,
-            their_best / our_best);
-        double difference = 0;
-        for (std::size_t i = 0; i < patches; ++i)
-            difference += std::abs(ours[i] - theirs[i]) / patches;
-        CHECK(difference < 0.02); // the same work was done
-        CHECK(their_best >= 20 * our_best);
+    // The best of rounds that take turns: what else the machine does slows single rounds of either
+    // side.
+    double our_best = 1e9, their_best = 1e9;
+    for (int round = 0; round < rounds; ++round) {
+        our_best = std::min(our_best, seconds([&] {
+                                skep::patch_ncc(window, reference, source, batch.pixels,
+                                                batch.homographies, ours);
+                            }));
+        their_best =
+            std::min(their_best, seconds([&] { correlate_with_opencv(batch, step, theirs); }));
     }
+    const int side = 2 * radius / step + 1;
+    std::printf("%3d samples, %2d hypotheses a pixel: %5.2f million patches/s (%s), OpenCV %.3f, "
+                "ratio %.1f\n",
+                side * side, hypotheses, patches / our_best / 1e6, skep::backend_name(),
+                patches / their_best / 1e6, their_best / our_best);
+    double difference = 0;
+    for (std::size_t i = 0; i < patches; ++i)
+        difference += std::abs(ours[i] - theirs[i]) / patches;
+    CHECK(difference < 0.02); // the same work was done
+    // A run compares some 300 patches a pixel in nine cycles, so 32 are what it sees; fewer are
+    // told, not judged.
+    if (hypotheses == 32) CHECK(their_best >= 20 * our_best);
+}
+
+int main() {
+    cv::setNumThreads(1);
+    for (int step : {2, 1})
+        for (int hypotheses : {1, 8, 32})
+            compare(hypotheses, step);
 }
