@@ -10,6 +10,8 @@ pub const MAX_COST: f32 = 2.0;
 /// Where a patch is sampled and how samples are weighted; the same for all pixels of a run.
 #[derive(Debug, Clone)]
 pub struct Window {
+    /// Half its side, in pixels.
+    radius: usize,
     offsets: Vec<Offsets>,
     /// `exp(-d^2 / (2 sigma^2))` of a difference d of grey values.
     colour_weights: Box<[f32; 256]>,
@@ -25,6 +27,9 @@ struct Offsets {
     y: [f32; LANES],
     /// Spatial weight; 0 in the lanes that only fill up the last vector.
     weight: [f32; LANES],
+    /// The same place from the window's top-left corner.
+    column: [i32; LANES],
+    row: [i32; LANES],
 }
 
 impl Window {
@@ -49,7 +54,10 @@ impl Window {
                 let lane = |get: fn(&(f32, f32, f32)) -> f32| {
                     std::array::from_fn(|lane| chunk.get(lane).map_or(0.0, get))
                 };
-                Offsets { x: lane(|s| s.0), y: lane(|s| s.1), weight: lane(|s| s.2) }
+                let (x, y) = (lane(|s| s.0), lane(|s| s.1));
+                let from_corner = |offsets: [f32; LANES]| offsets.map(|offset| offset as i32 + radius);
+                let (column, row) = (from_corner(x), from_corner(y));
+                Offsets { x, y, weight: lane(|s| s.2), column, row }
             })
             .collect();
         let colour_weight = |difference: usize| {
@@ -57,6 +65,7 @@ impl Window {
             (-difference.powi(2) / (2.0 * colour_sigma.powi(2))).exp() as f32
         };
         Window {
+            radius: radius as usize,
             offsets,
             colour_weights: Box::new(std::array::from_fn(colour_weight)),
             samples: samples.len() as u64,
@@ -109,7 +118,11 @@ impl ReferencePatch {
     #[inline(always)]
     pub fn sample<S: Simd>(&mut self, simd: S, window: &Window, image: &PackedImage, x: usize, y: usize) {
         let (width, height) = (image.width, image.height);
-        let centre = simd.splat(f32::from(image.grey(x, y)));
+        let (radius, centre) = (window.radius, image.grey(x, y));
+        if x >= radius && y >= radius && x + radius < width && y + radius < height {
+            return self.sample_inside(simd, window, image, (x, y), centre);
+        }
+        let centre = simd.splat(f32::from(centre));
         let (x, y) = (simd.splat(x as f32), simd.splat(y as f32));
         let (right, bottom) = (simd.splat((width - 1) as f32), simd.splat((height - 1) as f32));
         let zero = simd.splat(0.0);
@@ -134,6 +147,37 @@ impl ReferencePatch {
             self.weighted[index] = simd.store(grey);
         }
         // The centre pixel's own neighbours weigh something unless the window is wider than the image.
+        let scale = 1.0 / simd.sum(total).max(f32::MIN_POSITIVE);
+        self.mean = simd.sum(sum) * scale;
+        self.normalise(simd, scale);
+    }
+
+    /// The same for a window that lies inside the image: nothing is clamped, so samples are bytes at known places.
+    #[inline(always)]
+    fn sample_inside<S: Simd>(
+        &mut self,
+        simd: S,
+        window: &Window,
+        image: &PackedImage,
+        (x, y): (usize, usize),
+        centre: u8,
+    ) {
+        let stride = image.stride() as i32;
+        let first = &image.pairs[(y - window.radius) * image.stride() + x - window.radius..];
+        let (mut total, mut sum) = (simd.splat(0.0), simd.splat(0.0));
+        for (index, offsets) in window.offsets.iter().enumerate() {
+            let places: [i32; LANES] =
+                std::array::from_fn(|lane| offsets.row[lane] * stride + offsets.column[lane]);
+            let grey: [u8; LANES] = std::array::from_fn(|lane| first[places[lane] as usize].to_le_bytes()[0]);
+            let likeness: [f32; LANES] =
+                std::array::from_fn(|lane| window.colour_weights[usize::from(grey[lane].abs_diff(centre))]);
+            let grey = simd.load(&grey.map(f32::from));
+            let weight = simd.mul(simd.load(&offsets.weight), simd.load(&likeness));
+            total = simd.add(total, weight);
+            sum = simd.mul_add(weight, grey, sum);
+            self.weights[index] = simd.store(weight);
+            self.weighted[index] = simd.store(grey);
+        }
         let scale = 1.0 / simd.sum(total).max(f32::MIN_POSITIVE);
         self.mean = simd.sum(sum) * scale;
         self.normalise(simd, scale);
