@@ -1,10 +1,11 @@
 //! What a view keeps between cycles: its solutions and what is known of them. Colonies live for one search only.
 
+use crate::ambc::MIN_FACING;
 use crate::camera::Camera;
 use crate::kernels::SlantedPlane;
 use crate::scene::DepthRange;
 use crate::views::ViewSets;
-use glam::{DVec2, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 /// A pixel's solution.
@@ -65,9 +66,14 @@ impl ViewState {
             let centre = DVec2::new((source % coarse_width) as f64, (source / coarse_width) as f64);
             let normal = solution.normal.as_dvec3();
             let on_plane = normal.dot(coarse.ray(centre)) * f64::from(solution.depth);
-            let depth = on_plane / normal.dot(fine.ray(DVec2::new(x as f64, y as f64)));
+            let ray = fine.ray(DVec2::new(x as f64, y as f64));
+            let depth = on_plane / normal.dot(ray);
             let is_usable = depth >= range.near && depth <= range.far;
-            Solution { depth: if is_usable { depth as f32 } else { solution.depth }, ..solution }
+            Solution {
+                depth: if is_usable { depth as f32 } else { solution.depth },
+                normal: facing(normal, ray).as_vec3(),
+                ..solution
+            }
         };
         let solutions: Vec<Solution> = (0..fine.pixels()).into_par_iter().map(refine).collect();
         let surface = surface(fine, &solutions);
@@ -75,6 +81,12 @@ impl ViewState {
         let sets = self.sets.of((0..fine.pixels()).map(parent));
         ViewState { solutions, cost, sets, surface }
     }
+}
+
+/// The normal, turned as little as makes it face the ray: a grazing one may face the coarse pixel's ray alone.
+fn facing(normal: DVec3, ray: DVec3) -> DVec3 {
+    let away = normal.dot(ray) + f64::from(MIN_FACING);
+    if away <= 0.0 { normal } else { (normal - ray * (away / ray.length_squared())).normalize() }
 }
 
 fn surface(camera: &Camera, solutions: &[Solution]) -> Vec<SlantedPlane> {
@@ -138,6 +150,26 @@ mod tests {
         let range = DepthRange { near: depths().fold(f64::MAX, f64::min), far: depths().fold(0.0, f64::max) };
         for solution in state.refined(&coarse, &fine, range).solutions {
             assert!((range.near as f32..=range.far as f32).contains(&solution.depth));
+        }
+    }
+
+    #[test]
+    fn a_normal_that_is_handed_up_faces_the_camera_in_every_fine_pixel() {
+        let fine = testing::camera(0.0, (36, 28));
+        let coarse = fine.halved();
+        let mut state = testing::exact(&coarse);
+        let ray = |camera: &Camera, pixel: usize| {
+            let width = camera.width as usize;
+            camera.ray(DVec2::new((pixel % width) as f64, (pixel / width) as f64))
+        };
+        for (pixel, solution) in state.solutions.iter_mut().enumerate() {
+            let along = ray(&coarse, pixel).cross(DVec3::Y).normalize();
+            solution.normal = (along - 1e-4 * ray(&coarse, pixel)).normalize().as_vec3();
+        }
+        for (pixel, solution) in state.refined(&coarse, &fine, RANGE).solutions.iter().enumerate() {
+            assert!(solution.normal.is_normalized());
+            assert!(solution.normal.dot(ray(&fine, pixel).as_vec3()) < -0.9 * MIN_FACING);
+            assert!((RANGE.near as f32..=RANGE.far as f32).contains(&solution.depth));
         }
     }
 
