@@ -15,7 +15,8 @@
  *   - Pointers must not be NULL unless their name or description says so; an array of 0 elements may be NULL. Numbers,
  *     sizes and order are checked; that memory is there, as large as was said, cannot be.
  *   - Inputs are copied, or only read during the call. Outputs belong to the caller. Objects from a ..._out parameter
- *     or a ..._create function are destroyed with their ..._destroy function, which takes NULL.
+ *     or a ..._create function are destroyed with their ..._destroy function, which takes NULL. What a call writes
+ *     must not overlap what it reads, nor anything else it writes.
  *   - Sizes count elements; strides are bytes from one row to the next. Texts end in NUL and are UTF-8.
  *   - Any function may be called from any thread at any time, on different objects or on the same, except that an
  *     object must not be destroyed while another call uses it. The library keeps no global state, prints nothing,
@@ -1238,6 +1239,8 @@ skep_status skep_scene_write_colmap(const struct skep_scene *scene,
  * consistency graphs in stereo/, raw ("photometric") and validated ("geometric"), previews in preview/; the lists of
  * images that COLMAP wants in stereo/; and fused.ply with fused.ply.vis when there is a cloud. `scene` is the one the
  * result was made from. Files are whole or not there.
+ *
+ * SKEP_ERR_ARGUMENT: another scene, or a view whose name would lead out of the folder.
  */
 skep_status skep_result_write_workspace(const struct skep_result *result,
                                         const struct skep_scene *scene,

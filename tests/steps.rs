@@ -155,8 +155,13 @@ fn what_does_not_belong_together_is_refused_by_name() {
     assert!(steps.mark(0, &mut marked, &verdicts).is_err());
     let cancelled = steps.search(0, 0, &[], None, &|_| ControlFlow::Break(()));
     assert_eq!(cancelled.unwrap_err(), Error::Cancelled);
-    let wrong_size = Offers::default();
-    assert!(steps.search(1, 0, &some(&first), Some(&wrong_size), &ignore_progress).is_ok());
+    let offers = steps.propagate(1, 0, &some(&first)).unwrap();
+    let search = |step, view, offers: &Offers| {
+        steps.search(step, view, &some(&first), Some(offers), &ignore_progress).map(drop).map_err(message)
+    };
+    assert!(search(1, 0, &offers).is_ok());
+    assert!(search(1, 1, &offers).unwrap_err().starts_with("offers is offers to view 0 for step 1"));
+    assert!(search(0, 0, &offers).unwrap_err().contains("those to view 0 for step 0"));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Fused points in C.
 
-use super::pointers::{destroy, get, out, wanted};
+use super::pointers::{destroy, get, out, wanted, wanted_one};
 use super::status::{guard, skep_status};
 use crate::maps::PointCloud;
 use std::sync::Arc;
@@ -30,10 +30,9 @@ pub unsafe extern "C" fn skep_cloud_get_count(
     guard(|| {
         // SAFETY: as the header demands of the caller.
         let (points, count) = unsafe { (&get(cloud, "cloud")?.points, out(count_out, "count_out")?) };
-        if !view_total_out.is_null() {
-            // SAFETY: as the header demands of the caller.
-            unsafe { out(view_total_out, "view_total_out") }?.set(points.views.total());
-        }
+        // SAFETY: as the header demands of the caller.
+        let view_total = unsafe { wanted_one(view_total_out, "view_total_out") }?;
+        view_total.into_iter().for_each(|out| out.set(points.views.total()));
         count.set(points.positions.len());
         Ok(())
     })

@@ -1,14 +1,14 @@
 //! Files for C programs: COLMAP scenes in, maps, clouds and whole dense folders out.
 
 use super::cloud::skep_cloud;
+use super::image::check_size;
 use super::maps;
 use super::pointers::{get, give_list, out, path, slice, wanted};
 use super::result::skep_result;
 use super::scene::skep_scene;
 use super::status::{Failure, guard, skep_status};
-use crate::camera::Camera;
 use crate::io::{self, Workspace};
-use crate::scene::DepthRange;
+use crate::scene::{DepthRange, View};
 use std::ffi::c_char;
 
 /// Reads a scene from a folder with images/ and a COLMAP model in sparse/ or sparse/0/, as `colmap image_undistorter`
@@ -56,6 +56,8 @@ pub unsafe extern "C" fn skep_scene_write_colmap(
 /// consistency graphs in stereo/, raw ("photometric") and validated ("geometric"), previews in preview/; the lists of
 /// images that COLMAP wants in stereo/; and fused.ply with fused.ply.vis when there is a cloud. `scene` is the one the
 /// result was made from. Files are whole or not there.
+///
+/// SKEP_ERR_ARGUMENT: another scene, or a view whose name would lead out of the folder.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_result_write_workspace(
     result: *const skep_result,
@@ -68,15 +70,19 @@ pub unsafe extern "C" fn skep_result_write_workspace(
             unsafe { (get(result, "result")?, get(scene, "scene")?.checked()?, path(folder, "folder")?) };
         let workspace = Workspace::new(folder);
         let views = scene.views();
-        for (&index, view) in &result.views {
-            let fits = views
-                .get(index as usize)
-                .filter(|own| own.camera.width == view.width && own.camera.pixels() == view.outcome.len());
-            let Some(own) = fits else {
+        let mut results = Vec::new();
+        for (&index, result) in &result.views {
+            let fits = |own: &&View| (own.camera.width, own.camera.height) == result.size();
+            let Some(own) = views.get(index as usize).filter(fits) else {
                 let value = format!("one whose view {index} is missing or of another size");
                 return Err(Failure::argument("scene", value, "the scene the result was made from"));
             };
-            workspace.write_view(&own.name, &own.camera, view)?;
+            results.push((own, result));
+        }
+        // The lists name all views, those without a result too.
+        views.iter().try_for_each(|view| Workspace::check_name(&view.name))?;
+        for (view, result) in results {
+            workspace.write_view(&view.name, &view.camera, result)?;
         }
         workspace.write_lists(views.iter().map(|view| view.name.as_str()))?;
         if let Some(points) = result.cloud() {
@@ -97,16 +103,6 @@ pub unsafe extern "C" fn skep_cloud_write_ply(cloud: *const skep_cloud, file: *c
     })
 }
 
-/// Refuses a map of no pixels, which no file has.
-fn check_size(width: u32, height: u32) -> Result<(u32, u32), Failure> {
-    for (name, side) in [("width", width), ("height", height)] {
-        if side == 0 || side > Camera::MAX_SIDE {
-            return Err(Failure::argument(name, side, format!("1 to {} pixels", Camera::MAX_SIDE)));
-        }
-    }
-    Ok((width, height))
-}
-
 /// Writes a depth map in COLMAP's layout: width floats a row, `stride_bytes` from row to row.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_write_depth_map(
@@ -117,9 +113,14 @@ pub unsafe extern "C" fn skep_write_depth_map(
     stride_bytes: usize,
 ) -> skep_status {
     guard(|| {
-        let size = check_size(width, height)?;
+        let size = (width, height);
+        check_size(size, "")?;
         // SAFETY: as the header demands of the caller.
         let (file, depth) = unsafe { (path(file, "file")?, maps::read(depth, size, stride_bytes, "depth")?) };
+        if let Some(pixel) = depth.iter().position(|depth| !(depth.is_finite() && *depth >= 0.0)) {
+            let name = format!("depth at column {}, row {}", pixel % width as usize, pixel / width as usize);
+            return Err(Failure::argument(&name, depth[pixel], "a finite depth above 0, or 0 for none"));
+        }
         Ok(io::write_depth_map(file, width, height, &depth)?)
     })
 }
@@ -134,11 +135,16 @@ pub unsafe extern "C" fn skep_write_normal_map(
     stride_bytes: usize,
 ) -> skep_status {
     guard(|| {
-        let size = check_size(width, height)?;
+        let size = (width, height);
+        check_size(size, "")?;
         let normal = normal.cast::<[f32; 3]>();
         // SAFETY: as the header demands of the caller.
         let (file, normal) =
             unsafe { (path(file, "file")?, maps::read(normal, size, stride_bytes, "normal")?) };
+        if let Some(pixel) = normal.iter().position(|normal| !normal.iter().all(|part| part.is_finite())) {
+            let name = format!("normal at column {}, row {}", pixel % width as usize, pixel / width as usize);
+            return Err(Failure::argument(&name, format!("{:?}", normal[pixel]), "finite numbers"));
+        }
         Ok(io::write_normal_map(file, width, height, &normal)?)
     })
 }
@@ -155,12 +161,16 @@ pub unsafe extern "C" fn skep_write_consistency_graph(
     view_total: usize,
 ) -> skep_status {
     guard(|| {
-        check_size(width, height)?;
+        check_size((width, height), "")?;
         let pixels = width as usize * height as usize;
         // SAFETY: as the header demands of the caller.
         let (file, counts, views) = unsafe {
             (path(file, "file")?, slice(counts, pixels, "counts")?, slice(views, view_total, "views")?)
         };
+        if let Some(place) = views.iter().position(|&view| view > i32::MAX as u32) {
+            let expected = format!("at most {}, what the layout holds", i32::MAX);
+            return Err(Failure::argument(&format!("views[{place}]"), views[place], expected));
+        }
         let mut ends = Vec::with_capacity(pixels);
         let sum = counts.iter().fold(0usize, |sum, &count| {
             ends.push(sum.saturating_add(count as usize));
@@ -243,18 +253,24 @@ pub unsafe extern "C" fn skep_read_consistency_graph(
         unsafe {
             let (width, height) = (out(width_out, "width_out")?, out(height_out, "height_out")?);
             let graph = io::read_consistency_graph(path(file, "file")?)?;
-            let place = |pixel: &[u32; 2]| pixel[1] as usize * graph.width as usize + pixel[0] as usize;
+            let pixels = graph.width as usize * graph.height as usize;
+            // The header may lie about the size: memory is taken only for a caller who has as much.
+            let counts = wanted(counts, count_capacity, pixels, "counts")?;
+            let place = |entry: usize| {
+                let [column, row] = graph.pixels[entry];
+                row as usize * graph.width as usize + column as usize
+            };
             let mut order: Vec<usize> = (0..graph.pixels.len()).collect();
-            order.sort_by_key(|&entry| place(&graph.pixels[entry]));
-            let mut per_pixel = vec![0u32; graph.width as usize * graph.height as usize];
-            let mut all = Vec::new();
-            for entry in order {
-                per_pixel[place(&graph.pixels[entry])] += graph.views.get(entry).len() as u32;
-                all.extend_from_slice(graph.views.get(entry));
+            order.sort_by_key(|&entry| place(entry));
+            let all: Vec<u32> = order.iter().flat_map(|&entry| graph.views.get(entry)).copied().collect();
+            give_list(&all, views, view_capacity, view_total_out, ("views", "view_total_out"))?;
+            if let Some(counts) = counts {
+                let mut per_pixel = vec![0u32; pixels];
+                order
+                    .iter()
+                    .for_each(|&entry| per_pixel[place(entry)] += graph.views.get(entry).len() as u32);
+                counts.set(&per_pixel);
             }
-            let counts = wanted(counts, count_capacity, per_pixel.len(), "counts")?;
-            give_list(&all, views, view_capacity, view_total_out, "views")?;
-            counts.into_iter().for_each(|out| out.set(&per_pixel));
             width.set(graph.width);
             height.set(graph.height);
         }

@@ -2,7 +2,7 @@
 
 use super::camera::skep_camera;
 use super::cloud::skep_cloud;
-use super::image::skep_image;
+use super::image::{check_size, skep_image};
 use super::maps;
 use super::options::{options_or_default, skep_options};
 use super::pointers::{get, out, slice};
@@ -58,15 +58,32 @@ impl skep_fusion_view {
         let size = (self.width, self.height);
         // SAFETY: as promised by the caller.
         unsafe {
+            check_size(size, &format!("{name}."))?;
             let camera =
                 get(self.camera, &format!("{name}.camera"))?.sized(size, &format!("{name}.camera"))?;
             let depth = maps::read(self.depth, size, self.depth_stride_bytes, &format!("{name}.depth"))?;
             let normal = self.normal.cast::<[f32; 3]>();
             let normal = maps::read(normal, size, self.normal_stride_bytes, &format!("{name}.normal"))?;
-            let picture = self.image_or_null.as_ref().map(|image| image.picture()).transpose()?;
+            let picture = match self.image_or_null.is_null() {
+                true => None,
+                false => Some(self.image(&format!("{name}.image"))?),
+            };
             let overlap = slice(self.overlap, self.overlap_count, &format!("{name}.overlap"))?;
             Ok(Own { camera, maps: Maps { depth, normal }, picture, overlap })
         }
+    }
+
+    /// # Safety
+    /// `image_or_null` points to an image.
+    unsafe fn image(&self, name: &str) -> Result<Picture, Failure> {
+        // SAFETY: as promised by the caller.
+        let image = unsafe { get(self.image_or_null, name) }?;
+        if (image.width, image.height) != (self.width, self.height) {
+            let expected = format!("{} x {} pixels, the size of the maps", self.width, self.height);
+            return Err(Failure::argument(name, format!("{} x {}", image.width, image.height), expected));
+        }
+        // SAFETY: as promised by the caller.
+        unsafe { image.picture(name) }
     }
 }
 

@@ -75,7 +75,8 @@ impl Depth {
     }
 }
 
-fn format(format: u32) -> Result<(Layout, Depth), Failure> {
+/// The layout and depth of the image called `name`.
+fn format(format: u32, name: &str) -> Result<(Layout, Depth), Failure> {
     let layout = match format % 16 {
         SKEP_FORMAT_GREY => Some(Layout { channels: 1, rgb: None }),
         SKEP_FORMAT_RGB => Some(Layout { channels: 3, rgb: Some([0, 1, 2]) }),
@@ -92,7 +93,7 @@ fn format(format: u32) -> Result<(Layout, Depth), Failure> {
     };
     layout.zip(depth).ok_or_else(|| {
         Failure::argument(
-            "image.format",
+            &format!("{name}.format"),
             format,
             "a SKEP_FORMAT_ layout, plus SKEP_FORMAT_16 or SKEP_FORMAT_FLOAT",
         )
@@ -144,28 +145,36 @@ pub fn check_rows(
     Ok(())
 }
 
+/// Refuses sizes that no image and no map has; `of` goes before the names of the sides.
+pub fn check_size((width, height): (u32, u32), of: &str) -> Result<(), Failure> {
+    for (name, side) in [("width", width), ("height", height)] {
+        if side == 0 || side > Camera::MAX_SIDE {
+            let expected = format!("1 to {} pixels", Camera::MAX_SIDE);
+            return Err(Failure::argument(&format!("{of}{name}"), side, expected));
+        }
+    }
+    Ok(())
+}
+
 impl skep_image {
-    /// A copy of the image.
+    /// A copy of the image; `name` is how an error calls it.
     ///
     /// # Safety
     /// `data` is NULL or points to an image as the fields describe it.
-    pub unsafe fn picture(&self) -> Result<Picture, Failure> {
-        let (layout, depth) = format(self.format)?;
-        for (name, side) in [("image.width", self.width), ("image.height", self.height)] {
-            if side == 0 || side > Camera::MAX_SIDE {
-                return Err(Failure::argument(name, side, format!("1 to {} pixels", Camera::MAX_SIDE)));
-            }
-        }
+    pub unsafe fn picture(&self, name: &str) -> Result<Picture, Failure> {
+        let (layout, depth) = format(self.format, name)?;
+        check_size((self.width, self.height), &format!("{name}."))?;
         let pixel_bytes = layout.channels * depth.bytes();
         let row_bytes = self.width as usize * pixel_bytes;
         // SAFETY: as promised by the caller.
-        let rows = unsafe { rows(self.data, row_bytes, self.height, self.stride_bytes, "image.data") }?;
+        let rows =
+            unsafe { rows(self.data, row_bytes, self.height, self.stride_bytes, &format!("{name}.data")) }?;
         let pixels = rows.enumerate().flat_map(|(row, bytes)| {
             bytes.chunks_exact(pixel_bytes).enumerate().map(move |(column, pixel)| (column, row, pixel))
         });
         let channel = |(column, row, pixel): (usize, usize, &[u8]), channel: usize| {
             depth.read(&pixel[channel * depth.bytes()..]).ok_or_else(|| {
-                let name = format!("image.data at column {column}, row {row}");
+                let name = format!("{name}.data at column {column}, row {row}");
                 Failure::argument(&name, "not a number", "numbers from 0 to 1")
             })
         };

@@ -49,19 +49,36 @@ pub unsafe extern "C" fn skep_plane_through(
         let (camera, normal, out) =
             unsafe { (get(camera, "camera")?, slice(normal, 3, "normal")?, out(plane_out, "plane_out")?) };
         let camera = camera.sized((1, 1), "camera")?;
-        let plane = Plane::at(&camera, DVec2::new(x, y), depth, DVec3::new(normal[0], normal[1], normal[2]));
-        let plane = skep_plane { normal: plane.normal.to_array(), distance: plane.distance };
-        plane.checked("plane")?;
-        out.set(plane);
+        for (name, value) in [("x", x), ("y", y)] {
+            if !value.is_finite() {
+                return Err(Failure::argument(name, value, "a finite number of pixels"));
+            }
+        }
+        if !(depth > 0.0 && depth.is_finite()) {
+            return Err(Failure::argument("depth", depth, "a finite depth above 0"));
+        }
+        let normal = DVec3::new(normal[0], normal[1], normal[2]);
+        let Plane { normal, distance } = Plane::at(&camera, DVec2::new(x, y), depth, normal);
+        if !(is_unit(normal) && distance > 0.0 && distance.is_finite()) {
+            return Err(Failure::argument(
+                "normal",
+                normal,
+                "a unit vector that faces the camera (n . ray < 0)",
+            ));
+        }
+        out.set(skep_plane { normal: normal.to_array(), distance });
         Ok(())
     })
+}
+
+fn is_unit(normal: DVec3) -> bool {
+    (normal.length() - 1.0).abs() < 1e-4
 }
 
 impl skep_plane {
     fn checked(&self, name: &str) -> Result<Plane, Failure> {
         let normal = DVec3::from_array(self.normal);
-        let is_unit = (normal.length() - 1.0).abs() < 1e-4;
-        if !is_unit {
+        if !is_unit(normal) {
             return Err(Failure::argument(&format!("{name}.normal"), normal, "a unit vector"));
         }
         if !(self.distance > 0.0 && self.distance.is_finite()) {
@@ -124,7 +141,7 @@ pub unsafe extern "C" fn skep_samples_create(
         // SAFETY: as the header demands of the caller.
         let (image, out) = unsafe { (get(image, "image")?, out(samples_out, "samples_out")?) };
         // SAFETY: as the header demands of the caller.
-        out.give(skep_samples { image: PackedImage::new(&unsafe { image.picture() }?) });
+        out.give(skep_samples { image: PackedImage::new(&unsafe { image.picture("image") }?) });
         Ok(())
     })
 }

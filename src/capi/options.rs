@@ -174,7 +174,7 @@ pub unsafe extern "C" fn skep_options_get_scales(
             })
             .collect();
         // SAFETY: as the header demands of the caller.
-        unsafe { give_list(&list, scales, capacity, count_out, "scales") }
+        unsafe { give_list(&list, scales, capacity, count_out, ("scales", "count_out")) }
     })
 }
 

@@ -89,6 +89,15 @@ fn check_count<T>(pointer: *const T, count: usize, name: &str) -> Result<(), Fai
     require_aligned(pointer, name)
 }
 
+/// [`out`] for a caller who may not want the value: `None` for NULL.
+///
+/// # Safety
+/// Like [`out`].
+pub unsafe fn wanted_one<T>(pointer: *mut T, name: &str) -> Result<Option<Out<T>>, Failure> {
+    // SAFETY: as promised by the caller.
+    (!pointer.is_null()).then(|| unsafe { out(pointer, name) }).transpose()
+}
+
 /// Memory for values that are written last of all.
 pub struct OutSlice<T>(*mut T);
 
@@ -135,7 +144,8 @@ pub unsafe fn wanted<T: Copy>(
     (!pointer.is_null()).then(|| unsafe { out_slice(pointer, capacity, needed, name) }).transpose()
 }
 
-/// A list of values for a caller who may only want to know how many there are: nothing is copied into NULL.
+/// A list of values for a caller who may only want to know how many there are: nothing is copied into NULL. `names`
+/// are those of `pointer` and `count`.
 ///
 /// # Safety
 /// `pointer` is NULL or points to memory for `capacity` values; `count` is NULL or points to memory for one.
@@ -144,10 +154,10 @@ pub unsafe fn give_list<T: Copy>(
     pointer: *mut T,
     capacity: usize,
     count: *mut usize,
-    name: &str,
+    (name, count_name): (&str, &str),
 ) -> Result<(), Failure> {
     // SAFETY: as promised by the caller.
-    let count = unsafe { out(count, "count") }?;
+    let count = unsafe { out(count, count_name) }?;
     if !pointer.is_null() {
         // SAFETY: as promised by the caller.
         unsafe { out_slice(pointer, capacity, values.len(), name) }?.set(values);

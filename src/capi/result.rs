@@ -330,7 +330,7 @@ pub unsafe extern "C" fn skep_result_get_sources(
         // SAFETY: as the header demands of the caller.
         unsafe {
             let view = get(result, "result")?.view(view)?;
-            give_list(&view.sources, sources, capacity, count_out, "sources")
+            give_list(&view.sources, sources, capacity, count_out, ("sources", "count_out"))
         }
     })
 }
@@ -387,7 +387,7 @@ pub unsafe extern "C" fn skep_result_get_cycles(
         let result = unsafe { get(result, "result") }?;
         let list: Vec<skep_cycle> = result.view(view)?.cycles.iter().map(skep_cycle::of).collect();
         // SAFETY: as the header demands of the caller.
-        unsafe { give_list(&list, cycles, capacity, count_out, "cycles") }
+        unsafe { give_list(&list, cycles, capacity, count_out, ("cycles", "count_out")) }
     })
 }
 

@@ -4,7 +4,7 @@ use super::camera::skep_camera;
 use super::image::skep_image;
 use super::maps;
 use super::options::{options_or_default, skep_options};
-use super::pointers::{self, copy_text, destroy, get, give_list, out, slice, text};
+use super::pointers::{self, copy_text, destroy, get, give_list, out, slice, text, wanted_one};
 use super::status::{Failure, guard, skep_status};
 use crate::scene::{DepthRange, Scene, SparsePoint, View};
 use crate::{fusion, views};
@@ -90,19 +90,16 @@ pub unsafe extern "C" fn skep_scene_add_view(
         // SAFETY: as the header demands of the caller.
         let (scene, image, camera) =
             unsafe { (get(scene, "scene")?, get(image, "image")?, get(camera, "camera")?) };
-        let camera = camera.sized((image.width, image.height), "camera")?;
         // SAFETY: as the header demands of the caller.
-        let picture = unsafe { image.picture() }?;
+        let picture = unsafe { image.picture("image") }?;
+        let camera = camera.sized((image.width, image.height), "camera")?;
         let name = match name_or_null.is_null() {
             true => None,
             // SAFETY: as the header demands of the caller.
             false => Some(unsafe { text(name_or_null, "name") }?.to_owned()),
         };
-        let place = match view_out.is_null() {
-            true => None,
-            // SAFETY: as the header demands of the caller.
-            false => Some(unsafe { out(view_out, "view_out") }?),
-        };
+        // SAFETY: as the header demands of the caller.
+        let place = unsafe { wanted_one(view_out, "view_out") }?;
         let mut parts = pointers::write(&scene.inner)?;
         let index = parts.views.len();
         let name = name.unwrap_or_else(|| format!("view{index:04}.png"));
@@ -274,9 +271,9 @@ pub unsafe extern "C" fn skep_scene_get_view(
         let camera = scene.with_view(view, |view| Ok(view.camera))?;
         // SAFETY: as the header demands of the caller.
         unsafe {
-            let width = (!width_out.is_null()).then(|| out(width_out, "width_out")).transpose()?;
-            let height = (!height_out.is_null()).then(|| out(height_out, "height_out")).transpose()?;
-            let place = (!camera_out.is_null()).then(|| out(camera_out, "camera_out")).transpose()?;
+            let width = wanted_one(width_out, "width_out")?;
+            let height = wanted_one(height_out, "height_out")?;
+            let place = wanted_one(camera_out, "camera_out")?;
             width.into_iter().for_each(|out| out.set(camera.width));
             height.into_iter().for_each(|out| out.set(camera.height));
             place.into_iter().for_each(|out| out.set(skep_camera::of(&camera)));
@@ -314,7 +311,7 @@ pub unsafe fn give_text(
 ) -> Result<(), Failure> {
     // SAFETY: as promised by the caller.
     unsafe {
-        let place = (!needed.is_null()).then(|| out(needed, "needed_out")).transpose()?;
+        let place = wanted_one(needed, "needed_out")?;
         let length = copy_text(text, buffer, capacity);
         place.into_iter().for_each(|place| place.set(length));
     }
@@ -363,7 +360,7 @@ pub unsafe extern "C" fn skep_scene_get_sources(
         let lists = views::source_lists(&scene, &options).lists;
         let list = lists.get(view as usize).ok_or_else(|| no_view(view, lists.len()))?;
         // SAFETY: as the header demands of the caller.
-        unsafe { give_list(list, sources, capacity, count_out, "sources") }
+        unsafe { give_list(list, sources, capacity, count_out, ("sources", "count_out")) }
     })
 }
 
@@ -383,7 +380,7 @@ pub unsafe extern "C" fn skep_scene_get_overlap(
         let overlaps = fusion::overlaps(scene.views().len(), scene.points());
         let list = overlaps.get(view as usize).ok_or_else(|| no_view(view, overlaps.len()))?;
         // SAFETY: as the header demands of the caller.
-        unsafe { give_list(list, views, capacity, count_out, "views") }
+        unsafe { give_list(list, views, capacity, count_out, ("views", "count_out")) }
     })
 }
 

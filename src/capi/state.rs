@@ -67,8 +67,8 @@ pub unsafe extern "C" fn skep_state_from_maps(
 ) -> skep_status {
     guard(|| {
         // SAFETY: as the header demands of the caller.
-        let (steps, out) = unsafe { (get(steps, "steps")?.inner(), out(state_out, "state_out")?) };
-        let size = steps.size(step as usize, view as usize)?;
+        let (steps, out) = unsafe { (get(steps, "steps")?, out(state_out, "state_out")?) };
+        let size = steps.inner().size(step as usize, view as usize)?;
         // SAFETY: as the header demands of the caller.
         let (maps, validated, cost) = unsafe {
             let normal = normal.cast::<[f32; 3]>();
@@ -81,7 +81,8 @@ pub unsafe extern "C" fn skep_state_from_maps(
         };
         let validated: Option<Vec<bool>> = validated.map(|map| map.iter().map(|&byte| byte != 0).collect());
         let own = OwnMaps { maps: &maps, validated: validated.as_deref(), cost: cost.as_deref() };
-        out.give(skep_state { state: State::from_maps(steps, step as usize, view as usize, &own)? });
+        let make = || State::from_maps(steps.inner(), step as usize, view as usize, &own);
+        out.give(skep_state { state: steps.install(make)? });
         Ok(())
     })
 }
@@ -184,7 +185,7 @@ pub unsafe extern "C" fn skep_state_save(
             return Ok(());
         }
         // SAFETY: as the header demands of the caller.
-        unsafe { give_list(&state.to_bytes(), buffer, capacity, size_out, "buffer") }
+        unsafe { give_list(&state.to_bytes(), buffer, capacity, size_out, ("buffer", "size_out")) }
     })
 }
 
@@ -200,10 +201,9 @@ pub unsafe extern "C" fn skep_state_load(
 ) -> skep_status {
     guard(|| {
         // SAFETY: as the header demands of the caller.
-        let (steps, bytes, out) = unsafe {
-            (get(steps, "steps")?.inner(), slice(bytes, size, "bytes")?, out(state_out, "state_out")?)
-        };
-        out.give(skep_state { state: State::from_bytes(steps, bytes)? });
+        let (steps, bytes, out) =
+            unsafe { (get(steps, "steps")?, slice(bytes, size, "bytes")?, out(state_out, "state_out")?) };
+        out.give(skep_state { state: steps.install(|| State::from_bytes(steps.inner(), bytes))? });
         Ok(())
     })
 }

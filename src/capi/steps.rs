@@ -1,7 +1,7 @@
 //! A run taken apart, in C.
 
 use super::options::{options_or_default, skep_options};
-use super::pointers::{destroy, get, give_list, out, slice};
+use super::pointers::{destroy, get, give_list, out, slice, wanted_one};
 use super::progress::{Host, skep_progress_fn};
 use super::result::skep_result;
 use super::scene::{no_view, skep_scene};
@@ -57,6 +57,11 @@ impl skep_steps {
         &self.steps
     }
 
+    /// Runs work on the threads of the steps: anywhere else it would start rayon's own, which never end.
+    pub fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
+        self.pool.install(work)
+    }
+
     fn states<'a>(&self, states: &[*const skep_state]) -> Result<Vec<Option<&'a State>>, Failure> {
         let place = |(index, &state): (usize, &*const skep_state)| match state.is_null() {
             true => Ok(None),
@@ -107,15 +112,12 @@ pub unsafe extern "C" fn skep_steps_get_count(
     guard(|| {
         // SAFETY: as the header demands of the caller.
         let steps = &unsafe { get(steps, "steps") }?.steps;
-        for (place, name, count) in [
-            (step_count_out, "step_count_out", steps.all().len()),
-            (view_count_out, "view_count_out", steps.views()),
-        ] {
-            if !place.is_null() {
-                // SAFETY: as the header demands of the caller.
-                unsafe { out(place, name) }?.set(count as u32);
-            }
-        }
+        // SAFETY: as the header demands of the caller.
+        let (step_count, view_count) = unsafe {
+            (wanted_one(step_count_out, "step_count_out")?, wanted_one(view_count_out, "view_count_out")?)
+        };
+        step_count.into_iter().for_each(|out| out.set(steps.all().len() as u32));
+        view_count.into_iter().for_each(|out| out.set(steps.views() as u32));
         Ok(())
     })
 }
@@ -180,7 +182,9 @@ pub unsafe extern "C" fn skep_steps_get_sources(
             return Err(no_view(view, steps.views()));
         }
         // SAFETY: as the header demands of the caller.
-        unsafe { give_list(steps.sources(view as usize), sources, capacity, count_out, "sources") }
+        unsafe {
+            give_list(steps.sources(view as usize), sources, capacity, count_out, ("sources", "count_out"))
+        }
     })
 }
 
@@ -202,7 +206,7 @@ pub unsafe extern "C" fn skep_steps_propagate(
         };
         let states = steps.states(states)?;
         let propagate = || steps.steps.propagate(step as usize, view as usize, &states);
-        out.give(skep_offers { offers: steps.pool.install(propagate)? });
+        out.give(skep_offers { offers: steps.install(propagate)? });
         Ok(())
     })
 }
@@ -246,7 +250,7 @@ pub unsafe extern "C" fn skep_steps_search(
         let host = Host::new(progress_or_null, user);
         let search =
             || steps.steps.search(step as usize, view as usize, &states, offers, &|at| host.tell(at));
-        out.give(skep_state::new(steps.pool.install(search)?));
+        out.give(skep_state::new(steps.install(search)?));
         Ok(())
     })
 }
@@ -275,7 +279,7 @@ pub unsafe extern "C" fn skep_steps_check(
             Ok(checked)
         };
         // A check without a state of the view's own has failed.
-        if let Some(state) = steps.pool.install(check)? {
+        if let Some(state) = steps.install(check)? {
             out.give(skep_state::new(state));
         }
         Ok(())
@@ -296,7 +300,7 @@ pub unsafe extern "C" fn skep_steps_hand_up(
         let (steps, state, out) =
             unsafe { (get(steps, "steps")?, get(state, "state")?, out(state_out, "state_out")?) };
         let hand_up = || steps.steps.hand_up(step as usize, view as usize, state.inner());
-        out.give(skep_state::new(steps.pool.install(hand_up)?));
+        out.give(skep_state::new(steps.install(hand_up)?));
         Ok(())
     })
 }
@@ -342,7 +346,7 @@ pub unsafe extern "C" fn skep_steps_finish(
         let states = steps.states(states)?;
         let host = Host::new(progress_or_null, user);
         let finish = || steps.steps.finish(view as usize, &states, &|at| host.tell(at));
-        out.give(skep_result::of_view(view, steps.pool.install(finish)?));
+        out.give(skep_result::of_view(view, steps.install(finish)?));
         Ok(())
     })
 }

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Write};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// Writes a file under a temporary name in the same folder and renames it; the folder is made when missing.
 pub fn write_file(
@@ -30,6 +30,15 @@ pub fn write_file(
     };
     attempt().map_err(|error| Error::file(path, format!("cannot be written: {error}")))
 }
+
+/// Whether a view of this name has its files inside the folder they belong in.
+pub(super) fn stays_inside(name: &str) -> bool {
+    let is_below = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
+    !name.is_empty() && is_below && !name.contains(char::is_control)
+}
+
+/// What [`stays_inside`] demands.
+pub(super) const NAME_INSIDE: &str = "a path below the folder of images, without `..`";
 
 /// Makes a file appear in a second place; a file that cannot be linked there is copied.
 pub(super) fn link_or_copy(from: &Path, to: &Path) -> Result<()> {

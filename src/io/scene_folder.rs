@@ -1,12 +1,13 @@
 //! Scenes from a folder with `images/` and `sparse/` or `sparse/0/`, as COLMAP's image_undistorter writes it.
 
 use super::colmap_model::ColmapModel;
+use super::files::{NAME_INSIDE, stays_inside};
 use super::pictures::{picture_size, read_picture, write_picture};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::image::Picture;
 use crate::scene::{DepthRange, Scene, View};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 /// Where a scene's photographs and model lie.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -83,10 +84,9 @@ pub fn read_scene(folder: &Path, depth_range: Option<DepthRange>) -> Result<Scen
 pub fn write_scene(folder: &Path, scene: &Scene) -> Result<()> {
     for (index, view) in scene.views().iter().enumerate() {
         let path = Path::new(&view.name);
-        let inside = path.components().all(|part| matches!(part, Component::Normal(_)));
         let is_png = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
-        if !(inside && is_png) {
-            let expected = "a name that ends in .png and stays inside its folder";
+        if !(stays_inside(&view.name) && is_png) {
+            let expected = format!("{NAME_INSIDE}, that ends in .png");
             return Err(Error::argument(format!("views[{index}].name"), &view.name, expected));
         }
     }

@@ -4,7 +4,7 @@ use super::colmap_maps::{
     Grid, read_depth_map, read_normal_map, write_consistency_graph, write_depth_map, write_normal_map,
 };
 use super::colmap_model::ColmapModel;
-use super::files::{cannot_be_read, link_or_copy, write_file};
+use super::files::{NAME_INSIDE, cannot_be_read, link_or_copy, stays_inside, write_file};
 use super::ply::{write_ply, write_visibility};
 use super::previews::{write_depth_preview, write_normal_preview, write_views_preview};
 use super::scene_folder::SceneFolder;
@@ -81,9 +81,18 @@ impl Workspace {
         self.folder.join("stereo").join(what).join(format!("{name}.{}.bin", kind.name()))
     }
 
+    /// Refuses the name of a view whose files would lie outside the folder.
+    pub fn check_name(name: &str) -> Result<()> {
+        if stays_inside(name) { Ok(()) } else { Err(Error::argument("view's name", name, NAME_INSIDE)) }
+    }
+
     /// Writes all files of one view: depth and normal map and consistency graph of the raw estimate (photometric) and
     /// of what was validated (geometric), and previews of the latter.
+    ///
+    /// # Errors
+    /// A name that would lead out of the folder; a file that cannot be written.
     pub fn write_view(&self, name: &str, camera: &Camera, result: &ViewResult) -> Result<()> {
+        Workspace::check_name(name)?;
         let filtered = result.filtered();
         self.write_maps(name, MapKind::Photometric, camera, &result.estimate, result)?;
         self.write_maps(name, MapKind::Geometric, camera, &filtered, result)?;

@@ -2,6 +2,7 @@
 
 use super::prepare::Steps;
 use super::state::{State, is_unit};
+use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::maps::{Counts, CycleRecord};
 use crate::state::{Solution, ViewState};
@@ -73,7 +74,9 @@ impl State {
         let small = |number: u64| usize::try_from(number).unwrap_or(usize::MAX);
         let (view, step, pixels, words, cycles) =
             (small(view), small(step), small(pixels), small(words), small(cycles));
-        let (width, height) = steps.size(step, view)?;
+        let (width, height) = steps.size(step, view).map_err(|reason| {
+            error(format!("a state of view {view} after step {step}"), format!("another: {reason}"))
+        })?;
         let sources = steps.sources(view).len();
         if pixels != width as usize * height as usize
             || words != ViewSets::empty(0, sources).words_per_pixel()
@@ -96,7 +99,13 @@ impl State {
         };
         // The length was checked: none of what follows can be missing.
         for _ in 0..cycles {
-            let [reduction, cycle, pixels, changed, validated] = [(); 5].map(|()| reader.u64().unwrap_or(0));
+            let record = [(); 5].map(|()| reader.u64().unwrap_or(0));
+            // No scale has more pixels, so that sums of these never overflow.
+            let most = u64::from(Camera::MAX_SIDE).pow(2);
+            if record.iter().any(|&number| number > most) {
+                return Err(error(format!("a cycle of {record:?}"), "what a search can report".into()));
+            }
+            let [reduction, cycle, pixels, changed, validated] = record;
             let (reduction, cycle) = (reduction as u32, cycle as u32);
             state.cycles.push(CycleRecord { reduction, cycle, pixels, changed, validated });
         }
@@ -106,7 +115,11 @@ impl State {
             let [consistent, validated] = reader.take::<2>().unwrap_or([0; 2]);
             let normal = Vec3::new(x, y, z);
             let usual = depth.is_finite() && depth >= 0.0 && cost >= 0.0 && validated <= 1;
-            if !usual || (depth > 0.0 && !is_unit(normal)) {
+            let fits = match depth > 0.0 {
+                true => is_unit(normal),
+                false => normal.is_finite() && validated == 0,
+            };
+            if !(usual && fits) {
                 let place = format!("column {}, row {}", pixel % width as usize, pixel / width as usize);
                 let value = format!("depth {depth}, normal {normal}, cost {cost} at {place}");
                 return Err(error(value, "what a search can find".into()));

@@ -118,7 +118,7 @@ impl Steps {
         let (mut changed, mut pixels) = (0, 0);
         for (view, state) in states.iter().enumerate() {
             let Some(state) = state else { continue };
-            state.require_marked(view, true)?;
+            state.require_marked(&format!("states[{view}]"), true)?;
             let record = state.cycles().last();
             changed += record.map_or(0, |record| record.changed);
             pixels += record.map_or(0, |record| record.pixels);
@@ -208,7 +208,7 @@ impl Steps {
             let value = format!("the state of view {}", state.view());
             return Err(Error::argument("state", value, format!("that of view {view}")));
         }
-        state.require_marked(view, true)?;
+        state.require_marked("state", true)?;
         let fine = self.scaled(step, view);
         let handed_up = state.solved.refined(&self.scaled[coarser][view].camera, &fine.camera, fine.range);
         Ok(state.on_finer_scale(step, handed_up))

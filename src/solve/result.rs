@@ -34,7 +34,7 @@ impl Steps {
         let step = self.all().len() - 1;
         self.check_states(step, view, states)?;
         for (place, state) in states.iter().enumerate() {
-            state.map_or(Ok(()), |state| state.require_marked(place, true))?;
+            state.map_or(Ok(()), |state| state.require_marked(&format!("states[{place}]"), true))?;
         }
         let Some(own) = states.get(view).copied().flatten() else {
             return Err(missing(view));

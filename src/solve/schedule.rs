@@ -18,11 +18,11 @@ pub struct Step {
 impl Step {
     /// All steps of a run in order.
     pub(super) fn all(options: &Options) -> Vec<Step> {
-        let scales = options.scales.iter().enumerate();
-        let cycles = |(scale_index, &scale): (usize, &Scale)| {
-            (0..=scale.cycles).map(move |cycle| Step { scale_index, scale, cycle })
-        };
-        scales.flat_map(cycles).collect()
+        let mut steps = Vec::new();
+        for (scale_index, &scale) in options.scales.iter().enumerate() {
+            steps.extend((0..=scale.cycles).map(|cycle| Step { scale_index, scale, cycle }));
+        }
+        steps
     }
 
     /// Rounds of bees.

@@ -14,8 +14,13 @@ use crate::state::{Solution, ViewState};
 use crate::views::{Reference, Source, ViewRules, ViewSets};
 
 /// The planes other views offer to the pixels of a view; nothing on a scale's first cycle or with propagation off.
-#[derive(Debug, Clone, Default)]
-pub struct Offers(Vec<Offer>);
+#[derive(Debug, Clone)]
+pub struct Offers {
+    step: usize,
+    view: usize,
+    /// One a pixel, or none at all.
+    planes: Vec<Offer>,
+}
 
 /// What a check says of every pixel of a view.
 #[derive(Debug, Clone)]
@@ -42,26 +47,28 @@ impl Steps {
         let target = states.get(view).copied().flatten();
         let (Some(target), true, true) = (target, self.options.propagation, self.all()[step].cycle > 0)
         else {
-            return Ok(Offers::default());
+            return Ok(Offers { step, view, planes: Vec::new() });
         };
         let mut givers = Vec::new();
         for (giver, state) in states.iter().enumerate() {
             let Some(state) = state else { continue };
-            state.require_marked(giver, true)?;
+            state.require_marked(&format!("states[{giver}]"), true)?;
             if self.sources(giver).contains(&(view as u32)) {
                 let camera = &self.scaled(step, giver).camera;
                 givers.push(Giver { view: giver, camera, state: &state.solved });
             }
         }
         let ScaledView { camera, range, .. } = self.scaled(step, view);
-        Ok(Offers(propagation::offers(camera, &target.solved, *range, &givers, cancelled)?))
+        let planes = propagation::offers(camera, &target.solved, *range, &givers, cancelled)?;
+        Ok(Offers { step, view, planes })
     }
 
     /// Searches a view in a step, starting from its own state, helped by what is validated in its sources and by
     /// what is offered. Without a state of its own it starts at random.
     ///
     /// # Errors
-    /// What [`Steps::propagate`] refuses; offers of another size; [`Error::Cancelled`] when the hook breaks.
+    /// What [`Steps::propagate`] refuses; offers to another view or for another step; [`Error::Cancelled`] when the hook
+    /// breaks.
     pub fn search(
         &self,
         step: usize,
@@ -88,18 +95,20 @@ impl Steps {
     ) -> Result<State> {
         self.check_states(step, view, states)?;
         for (place, state) in states.iter().enumerate() {
-            state.map_or(Ok(()), |state| state.require_marked(place, true))?;
+            state.map_or(Ok(()), |state| state.require_marked(&format!("states[{place}]"), true))?;
         }
         let own = states.get(view).copied().flatten();
         let schedule = self.all()[step];
         let ScaledView { camera, mask, .. } = self.scaled(step, view);
-        let offers = offers.map(|offers| &offers.0[..]).filter(|offers| !offers.is_empty());
         if let Some(offers) = offers
-            && offers.len() != camera.pixels()
+            && (offers.step, offers.view, offers.planes.len().max(camera.pixels()))
+                != (step, view, camera.pixels())
         {
-            let expected = format!("one for each of {} pixels", camera.pixels());
-            return Err(Error::argument("offers", format!("{} values", offers.len()), expected));
+            let value = format!("offers to view {} for step {}", offers.view, offers.step);
+            let expected = format!("those to view {view} for step {step}, of the same steps");
+            return Err(Error::argument("offers", value, expected));
         }
+        let offers = offers.map(|offers| &offers.planes[..]).filter(|planes| !planes.is_empty());
         let mut state = State {
             view,
             step,
@@ -177,7 +186,7 @@ impl Steps {
         let Some(own) = states.get(view).copied().flatten() else {
             return Err(missing(view));
         };
-        own.require_marked(view, false)?;
+        own.require_marked(&format!("states[{view}]"), false)?;
         let reference = self.reference(step, view, states);
         let sources: Vec<Option<&ViewState>> = self
             .sources(view)
@@ -193,7 +202,7 @@ impl Steps {
     /// # Errors
     /// Another view than the state's; a state that is marked already or has another size.
     pub fn mark(&self, view: usize, state: &mut State, verdicts: &Verdicts) -> Result<()> {
-        state.require_marked(view, false)?;
+        state.require_marked("state", false)?;
         if state.view() != view || verdicts.0.len() != state.pixels() {
             let value = format!("{} pixels of view {view}", verdicts.0.len());
             let expected =

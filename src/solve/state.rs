@@ -151,13 +151,13 @@ impl State {
         self.pixels() == pixels && self.solved.sets.words_per_pixel() == words
     }
 
-    /// Refuses a state that is (not) marked.
-    pub(super) fn require_marked(&self, place: usize, marked: bool) -> Result<()> {
+    /// Refuses a state that is (not) marked; `name` is how the error calls it.
+    pub(super) fn require_marked(&self, name: &str, marked: bool) -> Result<()> {
         if self.marked == marked {
             return Ok(());
         }
         let state = |marked| if marked { "checked in its step" } else { "searched and not yet checked" };
-        Err(Error::argument(format!("states[{place}]"), state(self.marked), state(marked)))
+        Err(Error::argument(name, state(self.marked), state(marked)))
     }
 
     pub(super) fn on_finer_scale(&self, step: usize, solved: ViewState) -> State {

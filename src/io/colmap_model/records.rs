@@ -3,11 +3,12 @@
 use super::{ColmapModel, ModelImage};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::io::files::{NAME_INSIDE, stays_inside};
 use crate::scene::SparsePoint;
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use std::collections::{HashMap, HashSet};
 use std::fmt::Display;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 /// COLMAP puts the centre of the top-left pixel at (0.5, 0.5), the crate at (0, 0).
 const HALF_PIXEL: f64 = 0.5;
@@ -218,7 +219,10 @@ impl ImageRecord {
                 place.error(format!("image {id} has the quaternion {values:?}; expected one of length 1"))
             );
         }
-        check_name(&self.name).map_err(|problem| place.error(problem))?;
+        if !stays_inside(&self.name) {
+            let problem = format!("the image name is {:?}; expected {NAME_INSIDE}", self.name);
+            return Err(place.error(problem));
+        }
         Ok(ModelImage {
             camera: Camera {
                 rotation: DMat3::from_quat(quaternion / length),
@@ -228,17 +232,6 @@ impl ImageRecord {
             name: self.name,
         })
     }
-}
-
-/// Refuses names that could make files outside the folder they belong in.
-fn check_name(name: &str) -> std::result::Result<(), String> {
-    let stays_below = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
-    if name.is_empty() || !stays_below || name.contains(char::is_control) {
-        return Err(format!(
-            "the image name is {name:?}; expected a path below the folder of images, without `..`"
-        ));
-    }
-    Ok(())
 }
 
 /// What is written, the same in text and binary. All ids count from 1.
