@@ -1,0 +1,164 @@
+/*
+ * A host's own maps become states: they guide searches, are checked against, and finish as they
+ * are.
+ */
+#include "support/check.h"
+#include "support/results.h"
+#include "support/scene.h"
+#include "tests.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+static skep_state *true_state(const scene *made, const skep_steps *steps, uint32_t step,
+                              uint32_t view) {
+    const photograph *truth = &made->photographs[view];
+    skep_state *state = NULL;
+    REQUIRE(skep_state_from_maps(steps, step, view, truth->depth, 4 * made->width, truth->normal,
+                                 12 * made->width, NULL, 0, NULL, 0, &state));
+    return state;
+}
+
+/* What goes in comes out, with masks of validity, costs, and rows apart. */
+static void check_round_trip(const scene *made, const skep_steps *steps, uint32_t step) {
+    const size_t pixels = scene_pixels(made), width = made->width, stride = width + 2;
+    const photograph *truth = &made->photographs[2];
+    float *depth = take(stride * made->height, sizeof *depth);
+    float *cost = take(pixels, sizeof *cost);
+    uint8_t *validated = take(pixels, 1);
+    size_t valid = 0;
+    for (size_t i = 0; i < pixels; ++i) {
+        depth[i / width * stride + i % width] = i % 5 ? truth->depth[i] : 0;
+        cost[i] = (float)(i % 7);
+        validated[i] = i % 3 ? 0 : (uint8_t)(i % 255 + 1);
+        valid += i % 5 && validated[i];
+    }
+    skep_state *state = NULL;
+    REQUIRE(skep_state_from_maps(steps, step, 2, depth, 4 * stride, truth->normal, 12 * width,
+                                 validated, width, cost, 4 * width, &state));
+    skep_state_info info;
+    REQUIRE(skep_state_get_info(state, &info));
+    CHECK(info.view == 2 && info.step == step && info.is_checked == 1 && info.reserved == 0,
+          "what it is");
+    CHECK(info.pixels == pixels && info.validated == valid, "%llu validated",
+          (unsigned long long)info.validated);
+    CHECK(info.ncc_evaluations == 0 && info.changed == 0, "nothing was searched");
+    float *depth_back = take(pixels, sizeof *depth_back),
+          *normal_back = take(pixels, 3 * sizeof(float));
+    float *cost_back = take(pixels, sizeof *cost_back);
+    uint8_t *validated_back = take(pixels, 1);
+    REQUIRE(skep_state_get_maps(state, depth_back, normal_back, cost_back, validated_back, pixels));
+    REQUIRE(skep_state_get_maps(state, NULL, NULL, NULL, NULL, 0));
+    for (size_t i = 0; i < pixels; ++i) {
+        const int is_there = i % 5 != 0;
+        CHECK(depth_back[i] == (is_there ? truth->depth[i] : 0), "pixel %zu", i);
+        CHECK(validated_back[i] == (is_there && validated[i]), "pixel %zu", i);
+        CHECK(cost_back[i] == cost[i], "pixel %zu", i);
+        for (int axis = 0; is_there && axis < 3; ++axis) {
+            CHECK(fabsf(normal_back[3 * i + axis] - truth->normal[3 * i + axis]) < 1e-6f,
+                  "pixel %zu", i);
+        }
+    }
+    skep_state_destroy(state);
+    free(validated_back);
+    free(cost_back);
+    free(normal_back);
+    free(depth_back);
+    free(validated);
+    free(cost);
+    free(depth);
+}
+
+/* Pixels away from edges whose depth is right. */
+static size_t right(const photograph *truth, const float *depth, size_t pixels) {
+    size_t count = 0;
+    for (size_t i = 0; i < pixels; ++i) {
+        count += truth->surface[i] && fabsf(depth[i] / truth->depth[i] - 1) < 0.01f;
+    }
+    return count;
+}
+
+/* A view with no state of its own takes the planes that the others' true maps offer it. */
+static void check_guidance(const scene *made, const skep_steps *steps, uint32_t step,
+                           skep_state **states) {
+    const size_t pixels = scene_pixels(made);
+    const photograph *truth = &made->photographs[0];
+    float *nothing = take(pixels, sizeof *nothing), *depth = take(pixels, sizeof *depth);
+    skep_state *true_own = states[0];
+    states[0] = NULL;
+    REQUIRE(skep_state_from_maps(steps, step, 0, nothing, 4 * made->width, truth->normal,
+                                 12 * made->width, NULL, 0, NULL, 0, &states[0]));
+    size_t found[2];
+    for (int is_offered = 0; is_offered < 2; ++is_offered) {
+        skep_offers *offers = NULL;
+        skep_state *searched = NULL;
+        REQUIRE(skep_steps_propagate(steps, step, 0, (const skep_state *const *)states, made->views,
+                                     &offers));
+        REQUIRE(skep_steps_search(steps, step, 0, (const skep_state *const *)states, made->views,
+                                  is_offered ? offers : NULL, NULL, NULL, &searched));
+        REQUIRE(skep_state_get_maps(searched, depth, NULL, NULL, NULL, pixels));
+        found[is_offered] = right(truth, depth, pixels);
+        skep_state_info info;
+        REQUIRE(skep_state_get_info(searched, &info));
+        CHECK(info.is_checked == 0 && info.validated == 0 && info.ncc_evaluations > pixels,
+              "searched");
+        skep_state_destroy(searched);
+        skep_offers_destroy(offers);
+    }
+    size_t away_from_edges = 0;
+    for (size_t i = 0; i < pixels; ++i) {
+        away_from_edges += truth->surface[i] != 0;
+    }
+    printf("right of %zu: %zu without offers, %zu with\n", away_from_edges, found[0], found[1]);
+    CHECK(found[1] > found[0], "%zu with offers, %zu without", found[1], found[0]);
+    CHECK(found[1] * 10 > away_from_edges * 7, "%zu of %zu pixels", found[1], away_from_edges);
+    skep_state_destroy(states[0]);
+    states[0] = true_own;
+    free(depth);
+    free(nothing);
+}
+
+void test_own_maps(const char *folder) {
+    (void)folder;
+    scene made;
+    scene_make(&made);
+    skep_options *options = quick_options();
+    skep_scene *handed_in = scene_hand_in(&made);
+    skep_steps *steps = NULL;
+    uint32_t count = 0;
+    REQUIRE(skep_steps_create(handed_in, options, &steps));
+    REQUIRE(skep_steps_get_count(steps, &count, NULL));
+    /* Steps need neither scene nor options any more. */
+    skep_options_destroy(options);
+    skep_scene_destroy(handed_in);
+    const uint32_t last = count - 1;
+    check_round_trip(&made, steps, last);
+
+    skep_state *states[MAX_VIEWS] = {NULL};
+    for (uint32_t view = 0; view < made.views; ++view) {
+        states[view] = true_state(&made, steps, last, view);
+    }
+    check_guidance(&made, steps, last, states);
+    /* Finished as they are, true maps match well and are all validated. */
+    skep_result *result = NULL;
+    REQUIRE(skep_steps_finish(steps, 1, (const skep_state *const *)states, made.views, NULL, NULL,
+                              &result));
+    skep_steps_destroy(steps);
+    view_maps maps = maps_of(result, 1);
+    CHECK(same_bytes(maps.depth[0], made.photographs[1].depth, 4 * scene_pixels(&made)),
+          "the maps given");
+    CHECK(maps.statistics.pixels[SKEP_PIXEL_VALIDATED] == scene_pixels(&made), "all are validated");
+    double sum = 0;
+    for (size_t i = 0; i < scene_pixels(&made); ++i) {
+        sum += maps.cost[i];
+    }
+    printf("mean cost of the true maps: %.3f\n", sum / scene_pixels(&made));
+    CHECK(scene_is_small() || sum < 0.25 * scene_pixels(&made), "%g", sum / scene_pixels(&made));
+    maps_free(&maps);
+    skep_result_destroy(result);
+    for (uint32_t view = 0; view < made.views; ++view) {
+        skep_state_destroy(states[view]);
+    }
+    scene_free(&made);
+}
