@@ -34,7 +34,7 @@
 #include <stdint.h>
 
 /**
- * Version of this interface. It rises with every incompatible change, and the library's SONAME with it.
+ * Version of this interface. It rises with every incompatible change, and the SONAME, which follows the version.
  */
 #define SKEP_ABI_VERSION 1
 
@@ -600,6 +600,11 @@ skep_status skep_options_get(const struct skep_options *options, const char *nam
 skep_status skep_options_set_seed(struct skep_options *options, uint64_t seed);
 
 /**
+ * Gets the seed.
+ */
+skep_status skep_options_get_seed(const struct skep_options *options, uint64_t *seed_out);
+
+/**
  * Sets the instruction set: "scalar", "base", "v3", or NULL for the best the machine has. A level that the machine does
  * not have is lowered to one it has. The result does not depend on it.
  */
@@ -697,7 +702,7 @@ skep_status skep_scene_validate(const struct skep_scene *scene);
 /**
  * The number of views.
  */
-skep_status skep_scene_view_count(const struct skep_scene *scene, uint32_t *count_out);
+skep_status skep_scene_get_view_count(const struct skep_scene *scene, uint32_t *count_out);
 
 /**
  * A view's size and camera. Each output may be NULL.
@@ -752,10 +757,10 @@ skep_status skep_scene_get_overlap(const struct skep_scene *scene,
  * or, where they share fewer than three, at points in the middle of `reference`'s inverse depth range. -1 when they
  * see nothing together.
  */
-skep_status skep_scene_triangulation_angle(const struct skep_scene *scene,
-                                           uint32_t reference,
-                                           uint32_t source,
-                                           double *degrees_out);
+skep_status skep_scene_get_triangulation_angle(const struct skep_scene *scene,
+                                               uint32_t reference,
+                                               uint32_t source,
+                                               double *degrees_out);
 
 /**
  * Estimates depth, normal and source views of every pixel of every view, and fuses what was validated.
@@ -783,6 +788,15 @@ void skep_result_destroy(struct skep_result *result);
  * SKEP_ERR_ARGUMENT: the result of a single view has no cloud.
  */
 skep_status skep_result_get_cloud(const struct skep_result *result, struct skep_cloud **cloud_out);
+
+/**
+ * The numbers of the views in a result, ascending: all of the scene's after a whole run. `views` may be NULL to only
+ * ask for how many there are.
+ */
+skep_status skep_result_get_views(const struct skep_result *result,
+                                  uint32_t *views,
+                                  size_t capacity,
+                                  size_t *count_out);
 
 /**
  * Copies one of the sentences about the run that its user should read, such as views without any source view;

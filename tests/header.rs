@@ -4,9 +4,9 @@
 use std::path::Path;
 
 /// The files of the interface in the order of the manual.
-const SECTIONS: [&str; 13] = [
-    "status", "options", "camera", "image", "scene", "progress", "result", "cloud", "fusion", "steps",
-    "state", "kernels", "files",
+const SECTIONS: [&str; 14] = [
+    "status", "options", "camera", "image", "scene", "progress", "result", "borrow", "cloud", "fusion",
+    "steps", "state", "kernels", "files",
 ];
 
 #[test]

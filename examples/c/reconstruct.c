@@ -64,7 +64,7 @@ int main(int count, char **arguments) {
     demand(skep_scene_read_colmap(arguments[1], 0, 0, &scene));
     demand(skep_reconstruct(scene, NULL, show, NULL, &result));
     fprintf(stderr, "\n");
-    demand(skep_scene_view_count(scene, &views));
+    demand(skep_scene_get_view_count(scene, &views));
     for (view = 0; view < views; ++view) {
         print_view(scene, result, view);
     }

@@ -15,7 +15,7 @@
 
 static void check_what_was_handed_in(const scene *made, const skep_scene *handed_in) {
     uint32_t count = 0;
-    REQUIRE(skep_scene_view_count(handed_in, &count));
+    REQUIRE(skep_scene_get_view_count(handed_in, &count));
     CHECK(count == made->views, "%u views", (unsigned)count);
     for (uint32_t view = 0; view < made->views; ++view) {
         uint32_t width = 0, height = 0;
@@ -44,7 +44,7 @@ static void check_what_was_handed_in(const scene *made, const skep_scene *handed
         REQUIRE(skep_scene_get_overlap(handed_in, view, overlap, MAX_VIEWS, &others));
         for (size_t i = 0; i < others; ++i) {
             double degrees = 0;
-            REQUIRE(skep_scene_triangulation_angle(handed_in, view, overlap[i], &degrees));
+            REQUIRE(skep_scene_get_triangulation_angle(handed_in, view, overlap[i], &degrees));
             CHECK(degrees > 2 && degrees < 45, "%g degrees", degrees);
         }
     }
@@ -219,7 +219,7 @@ static void check_extremes(const skep_options *options) {
         REQUIRE(skep_result_get_warning(result, 0, warning, sizeof warning, &needed));
         CHECK(strstr(warning, "left") && needed == strlen(warning) + 1, "%s", warning);
         double degrees = 0;
-        REQUIRE(skep_scene_triangulation_angle(tiny, 0, 1, &degrees));
+        REQUIRE(skep_scene_get_triangulation_angle(tiny, 0, 1, &degrees));
         CHECK((degrees == -1) == (width == 3), "%g", degrees);
         skep_result_destroy(result);
         skep_scene_destroy(tiny);

@@ -231,8 +231,8 @@ static void check_changes(skep_scene *handed_in, const skep_image *image,
 
 static void check_questions(skep_scene *handed_in) {
     FAILS(skep_scene_validate(NULL), SKEP_ERR_NULL, "scene");
-    FAILS(skep_scene_view_count(NULL, OUT(uint32_t, 0)), SKEP_ERR_NULL, "scene");
-    FAILS(skep_scene_view_count(handed_in, NULL), SKEP_ERR_NULL, "count_out");
+    FAILS(skep_scene_get_view_count(NULL, OUT(uint32_t, 0)), SKEP_ERR_NULL, "scene");
+    FAILS(skep_scene_get_view_count(handed_in, NULL), SKEP_ERR_NULL, "count_out");
     FAILS(skep_scene_get_view(NULL, 0, OUT(uint32_t, 0), OUT(uint32_t, 1), OUT(skep_camera, 2)),
           SKEP_ERR_NULL, "scene");
     FAILS(
@@ -264,13 +264,13 @@ static void check_questions(skep_scene *handed_in) {
           SKEP_ERR_CAPACITY, "views");
     FAILS(skep_scene_get_overlap(handed_in, 0, OUT(uint32_t, 0), 9, NULL), SKEP_ERR_NULL,
           "count_out");
-    FAILS(skep_scene_triangulation_angle(NULL, 0, 1, OUT(double, 0)), SKEP_ERR_NULL, "scene");
-    FAILS(skep_scene_triangulation_angle(handed_in, 0, 1, NULL), SKEP_ERR_NULL, "degrees_out");
-    FAILS(skep_scene_triangulation_angle(handed_in, 1, 1, OUT(double, 0)), SKEP_ERR_ARGUMENT,
+    FAILS(skep_scene_get_triangulation_angle(NULL, 0, 1, OUT(double, 0)), SKEP_ERR_NULL, "scene");
+    FAILS(skep_scene_get_triangulation_angle(handed_in, 0, 1, NULL), SKEP_ERR_NULL, "degrees_out");
+    FAILS(skep_scene_get_triangulation_angle(handed_in, 1, 1, OUT(double, 0)), SKEP_ERR_ARGUMENT,
           "source is 1");
-    FAILS(skep_scene_triangulation_angle(handed_in, 2, 1, OUT(double, 0)), SKEP_ERR_ARGUMENT,
+    FAILS(skep_scene_get_triangulation_angle(handed_in, 2, 1, OUT(double, 0)), SKEP_ERR_ARGUMENT,
           "view is 2");
-    FAILS(skep_scene_triangulation_angle(handed_in, 0, 3, OUT(double, 0)), SKEP_ERR_ARGUMENT,
+    FAILS(skep_scene_get_triangulation_angle(handed_in, 0, 3, OUT(double, 0)), SKEP_ERR_ARGUMENT,
           "view is 3");
 }
 

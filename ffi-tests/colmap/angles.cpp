@@ -19,7 +19,7 @@ using check::Owned;
 double our_angle(const skep_scene *scene, uint32_t a, uint32_t b)
 {
     double degrees = 0;
-    must(skep_scene_triangulation_angle(scene, a, b, &degrees));
+    must(skep_scene_get_triangulation_angle(scene, a, b, &degrees));
     return degrees;
 }
 

@@ -32,7 +32,7 @@ std::string name_of(const skep_scene *scene, uint32_t view)
 uint32_t count_views(const skep_scene *scene)
 {
     uint32_t count = 0;
-    must(skep_scene_view_count(scene, &count));
+    must(skep_scene_get_view_count(scene, &count));
     return count;
 }
 

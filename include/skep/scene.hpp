@@ -142,7 +142,7 @@ class Scene : public detail::Handle<skep_scene, skep_scene_destroy> {
     Fallible<void> validate() const { return detail::give(skep_scene_validate(get())); }
     Fallible<std::uint32_t> view_count() const {
         std::uint32_t count = 0;
-        return detail::give(skep_scene_view_count(get(), &count), count);
+        return detail::give(skep_scene_get_view_count(get(), &count), count);
     }
     Fallible<Size> size(std::uint32_t view) const {
         Size size;
@@ -178,7 +178,7 @@ class Scene : public detail::Handle<skep_scene, skep_scene_destroy> {
     /// In degrees; -1 when the views see nothing together.
     Fallible<double> triangulation_angle(std::uint32_t reference, std::uint32_t source) const {
         double degrees = 0;
-        return detail::give(skep_scene_triangulation_angle(get(), reference, source, &degrees),
+        return detail::give(skep_scene_get_triangulation_angle(get(), reference, source, &degrees),
                             degrees);
     }
 };

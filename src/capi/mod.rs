@@ -8,6 +8,7 @@
 // What callers must uphold is said once, at the head of the header, in C's words.
 #![allow(clippy::missing_safety_doc)]
 
+mod borrow;
 mod camera;
 mod cloud;
 mod files;

@@ -102,6 +102,20 @@ pub unsafe extern "C" fn skep_options_set_seed(options: *mut skep_options, seed:
     })
 }
 
+/// Gets the seed.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_options_get_seed(
+    options: *const skep_options,
+    seed_out: *mut u64,
+) -> skep_status {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        let (options, out) = unsafe { (get(options, "options")?, out(seed_out, "seed_out")?) };
+        out.set(pointers::read(&options.options)?.seed);
+        Ok(())
+    })
+}
+
 /// Sets the instruction set: "scalar", "base", "v3", or NULL for the best the machine has. A level that the machine does
 /// not have is lowered to one it has. The result does not depend on it.
 #[unsafe(no_mangle)]

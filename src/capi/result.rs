@@ -87,7 +87,7 @@ impl skep_result {
         self.points.as_deref()
     }
 
-    fn view(&self, view: u32) -> Result<&ViewResult, Failure> {
+    pub fn view(&self, view: u32) -> Result<&ViewResult, Failure> {
         self.views.get(&view).ok_or_else(|| {
             let views: Vec<String> = self.views.keys().map(u32::to_string).collect();
             Failure::argument("view", view, format!("one of those in the result: {}", views.join(", ")))
@@ -156,6 +156,24 @@ pub unsafe extern "C" fn skep_result_get_cloud(
         })?;
         out.give(skep_cloud { points });
         Ok(())
+    })
+}
+
+/// The numbers of the views in a result, ascending: all of the scene's after a whole run. `views` may be NULL to only
+/// ask for how many there are.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_result_get_views(
+    result: *const skep_result,
+    views: *mut u32,
+    capacity: usize,
+    count_out: *mut usize,
+) -> skep_status {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        let result = unsafe { get(result, "result") }?;
+        let list: Vec<u32> = result.views.keys().copied().collect();
+        // SAFETY: as the header demands of the caller.
+        unsafe { give_list(&list, views, capacity, count_out, ("views", "count_out")) }
     })
 }
 
@@ -388,71 +406,6 @@ pub unsafe extern "C" fn skep_result_get_cycles(
         let list: Vec<skep_cycle> = result.view(view)?.cycles.iter().map(skep_cycle::of).collect();
         // SAFETY: as the header demands of the caller.
         unsafe { give_list(&list, cycles, capacity, count_out, ("cycles", "count_out")) }
-    })
-}
-
-/// The raw depth map inside the result, without a copy: height rows of width floats, dense. Valid until the result is
-/// destroyed; only to be read.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_result_borrow_depth(
-    result: *const skep_result,
-    view: u32,
-    depth_out: *mut *const f32,
-) -> skep_status {
-    guard(|| {
-        // SAFETY: as the header demands of the caller.
-        let (result, out) = unsafe { (get(result, "result")?, out(depth_out, "depth_out")?) };
-        out.set(result.view(view)?.estimate.depth.as_ptr());
-        Ok(())
-    })
-}
-
-/// The raw normal map inside the result, without a copy: height rows of width times x, y, z, dense. Valid until the
-/// result is destroyed; only to be read.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_result_borrow_normal(
-    result: *const skep_result,
-    view: u32,
-    normal_out: *mut *const f32,
-) -> skep_status {
-    guard(|| {
-        // SAFETY: as the header demands of the caller.
-        let (result, out) = unsafe { (get(result, "result")?, out(normal_out, "normal_out")?) };
-        out.set(result.view(view)?.estimate.normal.as_ptr().cast());
-        Ok(())
-    })
-}
-
-/// The costs inside the result, without a copy, as skep_result_get_cost explains them. Valid until the result is
-/// destroyed; only to be read.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_result_borrow_cost(
-    result: *const skep_result,
-    view: u32,
-    cost_out: *mut *const f32,
-) -> skep_status {
-    guard(|| {
-        // SAFETY: as the header demands of the caller.
-        let (result, out) = unsafe { (get(result, "result")?, out(cost_out, "cost_out")?) };
-        out.set(result.view(view)?.cost.as_ptr());
-        Ok(())
-    })
-}
-
-/// The SKEP_PIXEL_ values inside the result, without a copy: height rows of width bytes, dense. Valid until the result
-/// is destroyed; only to be read.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_result_borrow_outcome(
-    result: *const skep_result,
-    view: u32,
-    outcome_out: *mut *const u8,
-) -> skep_status {
-    guard(|| {
-        // SAFETY: as the header demands of the caller.
-        let (result, out) = unsafe { (get(result, "result")?, out(outcome_out, "outcome_out")?) };
-        // An outcome is one byte, its discriminant.
-        out.set(result.view(view)?.outcome.as_ptr().cast());
-        Ok(())
     })
 }
 

@@ -247,7 +247,10 @@ pub unsafe extern "C" fn skep_scene_validate(scene: *const skep_scene) -> skep_s
 
 /// The number of views.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_scene_view_count(scene: *const skep_scene, count_out: *mut u32) -> skep_status {
+pub unsafe extern "C" fn skep_scene_get_view_count(
+    scene: *const skep_scene,
+    count_out: *mut u32,
+) -> skep_status {
     guard(|| {
         // SAFETY: as the header demands of the caller.
         let (scene, out) = unsafe { (get(scene, "scene")?, out(count_out, "count_out")?) };
@@ -388,7 +391,7 @@ pub unsafe extern "C" fn skep_scene_get_overlap(
 /// or, where they share fewer than three, at points in the middle of `reference`'s inverse depth range. -1 when they
 /// see nothing together.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_scene_triangulation_angle(
+pub unsafe extern "C" fn skep_scene_get_triangulation_angle(
     scene: *const skep_scene,
     reference: u32,
     source: u32,

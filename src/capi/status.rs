@@ -10,7 +10,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 /// What a call came to: SKEP_OK or one of the negative SKEP_ERR_ codes. skep_last_error tells the rest.
 pub type skep_status = i32;
 
-/// Version of this interface. It rises with every incompatible change, and the library's SONAME with it.
+/// Version of this interface, which rises with every incompatible change. The SONAME follows the library's version.
 pub const SKEP_ABI_VERSION: u32 = 1;
 
 /// Done.

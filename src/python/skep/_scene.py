@@ -129,7 +129,7 @@ class Scene:
 
     def __len__(self) -> int:
         count = ffi.new("uint32_t *")
-        check(lib.skep_scene_view_count(self._handle, count))
+        check(lib.skep_scene_get_view_count(self._handle, count))
         number: int = count[0]
         return number
 
@@ -174,7 +174,7 @@ class Scene:
         """The angle of two views in degrees; None when they see nothing together."""
         degrees = ffi.new("double *")
         views = index(reference, "reference"), index(source, "source")
-        check(lib.skep_scene_triangulation_angle(self._handle, *views, degrees))
+        check(lib.skep_scene_get_triangulation_angle(self._handle, *views, degrees))
         return None if degrees[0] < 0 else degrees[0]
 
 
