@@ -86,8 +86,11 @@ pub unsafe extern "C" fn skep_steps_create(
         let (scene, options, out) = unsafe {
             (get(scene, "scene")?, options_or_default(options_or_null)?, out(steps_out, "steps_out")?)
         };
-        let steps = Steps::new(&scene.checked()?, &options)?;
-        out.give(skep_steps { steps, pool: JoinedPool::new(options.threads)? });
+        let scene = scene.checked()?;
+        options.check()?;
+        let pool = JoinedPool::new(options.threads)?;
+        let steps = pool.install(|| Steps::new(&scene, &options))?;
+        out.give(skep_steps { steps, pool });
         Ok(())
     })
 }
