@@ -183,6 +183,9 @@ static void check_seed_and_simd(const scene *made, const skep_scene *handed_in,
     }
     REQUIRE(skep_options_set_simd(options, NULL));
     REQUIRE(skep_options_set_seed(options, 7));
+    uint64_t seed = 0;
+    REQUIRE(skep_options_get_seed(options, &seed));
+    CHECK(seed == 7, "the seed is read back");
     skep_result *other = scene_run(handed_in, options);
     view_maps a = maps_of(first, 0), b = maps_of(other, 0);
     CHECK(!same_bytes(a.depth[0], b.depth[0], 4 * scene_pixels(made)), "another seed");

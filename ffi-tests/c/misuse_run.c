@@ -94,6 +94,10 @@ static void check_maps(const scene *made, const skep_result *result) {
 }
 
 static void check_results(const skep_result *result) {
+    FAILS(skep_result_get_views(NULL, OUT(uint32_t, 0), 9, OUT(size_t, 1)), SKEP_ERR_NULL, "result");
+    FAILS(skep_result_get_views(result, NULL, 0, NULL), SKEP_ERR_NULL, "count_out");
+    FAILS(skep_result_get_views(result, OUT(uint32_t, 0), 1, OUT(size_t, 1)), SKEP_ERR_CAPACITY,
+          "views");
     FAILS(skep_result_get_cloud(NULL, OUT(skep_cloud *, 0)), SKEP_ERR_NULL, "result");
     FAILS(skep_result_get_cloud(result, NULL), SKEP_ERR_NULL, "cloud_out");
     FAILS(skep_result_get_warning(NULL, 0, OUT(char, 0), 9, OUT(size_t, 1)), SKEP_ERR_NULL,

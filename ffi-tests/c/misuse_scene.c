@@ -82,6 +82,8 @@ static void check_options(void) {
     FAILS(skep_options_get(options, "reward", NULL), SKEP_ERR_NULL, "value_out");
     FAILS(skep_options_get(options, "no", OUT(double, 0)), SKEP_ERR_ARGUMENT, "no");
     FAILS(skep_options_set_seed(NULL, 1), SKEP_ERR_NULL, "options");
+    FAILS(skep_options_get_seed(NULL, OUT(uint64_t, 0)), SKEP_ERR_NULL, "options");
+    FAILS(skep_options_get_seed(options, NULL), SKEP_ERR_NULL, "seed_out");
     FAILS(skep_options_set_simd(NULL, "base"), SKEP_ERR_NULL, "options");
     FAILS(skep_options_set_simd(options, "avx512"), SKEP_ERR_ARGUMENT, "level is avx512");
     const skep_scale good[2] = {{1, 4, 1, 1, 1}, {0, 4, 1, 1, 1}};

@@ -121,6 +121,10 @@ class Result : public detail::Handle<skep_result, skep_result_destroy> {
     Fallible<MapView<const std::uint8_t>> borrow_outcome(std::uint32_t view) const {
         return borrowed<std::uint8_t>(skep_result_borrow_outcome, 1, view);
     }
+    Fallible<std::vector<std::uint32_t>> views() const {
+        return detail::list<std::uint32_t>(
+            [&](auto... out) { return skep_result_get_views(get(), out...); });
+    }
     Fallible<std::vector<std::uint32_t>> sources(std::uint32_t view) const {
         return detail::list<std::uint32_t>(
             [&](auto... out) { return skep_result_get_sources(get(), view, out...); });

@@ -26,6 +26,10 @@ class Options : public detail::Handle<skep_options, skep_options_destroy> {
         double value = 0;
         return detail::give(skep_options_get(get(), name, &value), value);
     }
+    Fallible<std::uint64_t> seed() const {
+        std::uint64_t seed = 0;
+        return detail::give(skep_options_get_seed(get(), &seed), seed);
+    }
     Fallible<void> set_seed(std::uint64_t seed) {
         return detail::give(skep_options_set_seed(get(), seed));
     }

@@ -43,10 +43,9 @@ class Options(Mapping[str, float]):
     its time. `Options(threads=2, fusion_min_views=2)` sets some at once. Numbers are checked when they are set.
     """
 
-    __slots__ = ("_handle", "_seed")
+    __slots__ = ("_handle",)
 
     _handle: Any
-    _seed: int
 
     def __init__(
         self,
@@ -104,14 +103,15 @@ class Options(Mapping[str, float]):
     @property
     def seed(self) -> int:
         """Of the random generator. The same seed, input and library version give the same bits."""
-        return self._seed
+        seed = ffi.new("uint64_t *")
+        check(lib.skep_options_get_seed(self._handle, seed))
+        return int(seed[0])
 
     @seed.setter
     def seed(self, seed: int) -> None:
         if not 0 <= seed < 1 << 64:
             raise ArgumentError(f"seed is {seed}: must be a whole number from 0 to 2^64 - 1")
         check(lib.skep_options_set_seed(self._handle, seed))
-        object.__setattr__(self, "_seed", seed)
 
     @property
     def scales(self) -> tuple[Scale, ...]:

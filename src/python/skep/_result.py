@@ -173,7 +173,11 @@ class Result:
 
     def __init__(self, handle: Any) -> None:
         self._handle = handle
-        self.views: tuple[ResultView, ...] = tuple(_until_refused(lambda view: ResultView(handle, view)))
+        count = ffi.new("size_t *")
+        check(lib.skep_result_get_views(handle, ffi.NULL, 0, count))
+        numbers = ffi.new("uint32_t[]", count[0])
+        check(lib.skep_result_get_views(handle, numbers, count[0], count))
+        self.views: tuple[ResultView, ...] = tuple(ResultView(handle, number) for number in numbers)
 
     def __len__(self) -> int:
         return len(self.views)
