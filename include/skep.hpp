@@ -2,10 +2,8 @@
 // libskep.
 //
 //     skep::Scene scene;
-//     for (const Photograph &photograph : photographs) // cv::Mat pictures, K, R, t of OpenCV or
-//     Eigen
-//         scene.add_view(photograph.picture, skep::camera(photograph.K, photograph.R,
-//         photograph.t));
+//     for (const Photograph &own : photographs) // cv::Mat pictures; K, R, t of OpenCV or Eigen
+//         scene.add_view(own.picture, skep::camera(own.K, own.R, own.t));
 //     scene.add_points(positions, view_counts, views); // or scene.set_depth_range for each view
 //     skep::Options options;
 //     options.set("threads", 4);
@@ -37,12 +35,10 @@
 // Pictures, maps and matrices of other libraries are known by their shape, nothing of them is
 // included:
 //   - a picture or map is a skep_image or skep::Map, or has data, rows, cols, step, depth() and
-//   channels(), as cv::Mat.
-//     One that receives a map is made by its create(rows, cols, type) if it has that, else it must
-//     have the size;
+//     channels(), as cv::Mat. One that receives a map is made by its create(rows, cols, type) if it
+//     has that, else it must have the size;
 //   - a matrix is called with (row, column) and has rows() and cols() or rows and cols, as in Eigen
-//   and cv::Matx, or is
-//     subscripted twice, as double[3][3], or is a cv::Mat of floats or doubles;
+//     and cv::Matx, or is subscripted twice, as double[3][3], or is a cv::Mat of floats or doubles;
 //   - a vector is such a matrix of one column or row, or is subscripted, as std::array and cv::Vec.
 #ifndef SKEP_HPP
 #define SKEP_HPP

@@ -57,7 +57,7 @@ void test_kernels() {
         SKEP_ERR_ARGUMENT, "2 as the pixels",
         skep::patch_ncc(window, reference_samples, source_samples, pixels, ways, {ncc.data(), 1}));
     FAILS(SKEP_ERR_ARGUMENT, "radius", skep::Window::create(99, 1, 1, 1));
-    FAILS(SKEP_ERR_ARGUMENT, "distance",
+    FAILS(SKEP_ERR_ARGUMENT, "depth is -2",
           skep::plane_through(reference, 1, 1, -2, world::Vector{0, 0, -1}));
     FAILS(SKEP_ERR_ARGUMENT, "normal is 2 long; expected 3",
           skep::plane_through(reference, 1, 1, 2, std::vector<double>{0, -1}));
