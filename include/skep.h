@@ -34,7 +34,7 @@
 #include <stdint.h>
 
 /**
- * Version of this interface. It rises with every incompatible change, and the SONAME, which follows the version.
+ * Version of this interface, which rises with every incompatible change. The SONAME follows the library's version.
  */
 #define SKEP_ABI_VERSION 1
 
@@ -754,7 +754,7 @@ skep_status skep_scene_get_overlap(const struct skep_scene *scene,
 
 /**
  * The triangulation angle of two views in degrees: the 75th percentile of the angles at the sparse points both saw
- * or, where they share fewer than three, at points in the middle of `reference`'s inverse depth range. -1 when they
+ * or, where they share fewer than three, at the geometric mean of `reference`'s depth range. -1 when they
  * see nothing together.
  */
 skep_status skep_scene_get_triangulation_angle(const struct skep_scene *scene,

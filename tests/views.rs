@@ -15,7 +15,7 @@ use skep::{DepthRange, Options, Scene, SparsePoint, View};
 const WIDTH: usize = 41;
 const HEIGHT: usize = 31;
 const CENTRE: (f32, f32) = (20.0, 15.0);
-const RANGE: DepthRange = DepthRange { near: 2.0, far: 6.0 };
+const RANGE: DepthRange = DepthRange { near: 1.8, far: 5.0 };
 /// Depth of the point that the middle pixel of the reference view sees, and that all cameras look at.
 const DEPTH: f32 = 4.0;
 

@@ -388,7 +388,7 @@ pub unsafe extern "C" fn skep_scene_get_overlap(
 }
 
 /// The triangulation angle of two views in degrees: the 75th percentile of the angles at the sparse points both saw
-/// or, where they share fewer than three, at points in the middle of `reference`'s inverse depth range. -1 when they
+/// or, where they share fewer than three, at the geometric mean of `reference`'s depth range. -1 when they
 /// see nothing together.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_scene_get_triangulation_angle(

@@ -118,13 +118,14 @@ fn shared_angles(scene: &Scene) -> SharedAngles {
     shared
 }
 
-/// Angles, in degrees, at points on rays of the reference view in the middle of its inverse depths that the other
+/// Angles, in degrees, at points on rays of the reference view in the middle of its depth range that the other
 /// view has in its image. Never between optical axes: parallel cameras would get none.
 fn angles_at_middle_depth(scene: &Scene, reference: usize, other: usize) -> Vec<f64> {
     let camera = &scene.views()[reference].camera;
     let other = &scene.views()[other].camera;
     let range = scene.depth_range(reference);
-    let depth = 2.0 / (1.0 / range.near + 1.0 / range.far);
+    // The geometric mean: ranges given by hand are generous, and the harmonic one would lie at their near end.
+    let depth = (range.near * range.far).sqrt();
     let steps = [0.1, 0.3, 0.5, 0.7, 0.9];
     let mut angles = Vec::new();
     for pixel in steps.iter().flat_map(|y| steps.map(|x| DVec2::new(x, *y))) {
