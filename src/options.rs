@@ -115,7 +115,8 @@ pub struct Options {
     pub depth_tolerance: f64,
     /// Largest angle between normals that are consistent, in degrees.
     pub normal_tolerance: f64,
-    /// Sources that must be consistent for a solution to be validated.
+    /// Sources that must be consistent for a solution to be validated. With 1 (and [`Aggregation::BestViews`]) a single
+    /// source view is enough to match a pixel, as scenes of two views need; otherwise it takes two.
     pub min_consistent: u32,
     /// Share of the pixel's sources that must be consistent.
     pub consistent_share: f64,
@@ -227,6 +228,15 @@ impl Options {
             }
         }
         Ok(())
+    }
+
+    /// Views a hypothesis must be seen in for its cost to mean anything. The sum of [`Aggregation::AllViews`] is infinite
+    /// for fewer than two by itself.
+    pub(crate) fn min_matched(&self) -> usize {
+        match self.aggregation {
+            Aggregation::AllViews => 2,
+            Aggregation::BestViews(_) => self.min_consistent.min(2) as usize,
+        }
     }
 
     /// Every option by name with its value, for reports and listings.

@@ -8,12 +8,13 @@ use crate::state::ViewState;
 /// A solution this close to an end of the depth range was stopped by it.
 const AT_RANGE_END: f32 = 1e-3;
 
-/// What became of each pixel of a view with this many source views.
+/// What became of each pixel of a view with this many source views, of which a solution must be seen in `needed`.
 pub fn outcomes(
     view: &ScaledView,
     state: &ViewState,
     assessment: &Assessment,
     sources: usize,
+    needed: usize,
 ) -> Vec<Outcome> {
     let (near, far) = (view.range.near as f32, view.range.far as f32);
     let outcome = |pixel: usize| {
@@ -22,11 +23,11 @@ pub fn outcomes(
             Outcome::Masked
         } else if solution.validated {
             Outcome::Validated
-        } else if sources < 2 || solution.depth <= 0.0 {
+        } else if sources < needed || solution.depth <= 0.0 {
             Outcome::NoSources
         } else if !assessment.textured[pixel] {
             Outcome::NoTexture
-        } else if assessment.sets.count(pixel) < 2 {
+        } else if assessment.sets.count(pixel) < needed {
             Outcome::NoSources
         } else if solution.depth < near * (1.0 + AT_RANGE_END) || solution.depth > far * (1.0 - AT_RANGE_END)
         {
@@ -83,10 +84,10 @@ mod tests {
             mask: Some(mask),
             range: RANGE,
         };
-        assert_eq!(outcomes(&view, state, &assessment, 4), expected);
+        assert_eq!(outcomes(&view, state, &assessment, 4, 2), expected);
         // With a single source no pixel can be validated: that is the reason.
         state.solutions.iter_mut().for_each(|solution| solution.validated = false);
-        let lonely = outcomes(&view, state, &assessment, 1);
+        let lonely = outcomes(&view, state, &assessment, 1, 2);
         assert!(lonely[0] == Outcome::Masked && lonely[1..].iter().all(|&o| o == Outcome::NoSources));
     }
 }

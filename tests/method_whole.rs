@@ -279,6 +279,19 @@ fn two_views_run_to_an_end_and_say_why_nothing_is_validated() {
 }
 
 #[test]
+fn two_views_are_enough_where_one_consistent_source_is() {
+    let made = procedural::plane_and_sphere().only(&[0, 1]);
+    let mut options = Options { min_consistent: 1, ..options() };
+    options.fusion.min_views = 1;
+    let result = run(&made, &options);
+    let validated = result.views[0].outcome_counts()[0] as f64 / result.views[0].outcome.len() as f64;
+    assert!(validated > 0.6, "{validated} of the pixels are validated");
+    let right = share_right_of_estimates(&made, &result, |view, pixel| is_validated(&result, view, pixel));
+    assert!(right > 0.85, "{right} of the validated pixels are right");
+    assert!(result.points.positions.len() > 5_000);
+}
+
+#[test]
 fn views_without_overlap_run_to_an_end_and_say_why_nothing_is_validated() {
     // Four cameras back to back, each before its own wall.
     let yaws = [0.0, 90.0, 180.0, 270.0];

@@ -129,19 +129,17 @@ static Scores score(const cv::Mat &truth, const cv::Mat &disparity, const cv::Ma
 /// Raw and validated disparities of the left view.
 static std::array<cv::Mat, 2> our_disparities(const cv::Mat &left, const cv::Mat &right) {
     skep::Scene scene;
-    // The method matches no pixel with a single source view. Each photograph is therefore given
-    // twice: what is known of the scene is still the pair.
-    for (int view = 0; view < 4; ++view) {
-        const bool is_left = view % 2 == 0;
+    for (const bool is_left : {true, false}) {
         const skep_camera camera = {
             focal, focal, cx, cy, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {is_left ? 0 : -baseline, 0, 0}};
         const std::uint32_t number = scene.add_view(is_left ? left : right, camera);
-        const std::array<std::uint32_t, 2> others = {is_left ? 1u : 0u, is_left ? 3u : 2u};
-        scene.set_sources(number, others);
+        const std::array<std::uint32_t, 1> other = {is_left ? 1u : 0u};
+        scene.set_sources(number, other);
         scene.set_depth_range(number, {focal * baseline / most_disparity, focal * baseline / 4});
     }
     skep::Options options;
-    options.set("min_consistent", 1);
+    options.set("min_consistent", 1); // a pair has one source
+    options.set("fusion.min_views", 1);
     // Near disparity 10 the default tolerance of 1 % is a tenth of a pixel; that much two views are
     // not sure of.
     options.set("depth_tolerance", 0.02);

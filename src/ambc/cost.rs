@@ -12,6 +12,8 @@ use glam::Vec3;
 #[derive(Debug, Clone, Copy)]
 pub struct CostRules {
     aggregation: Aggregation,
+    /// Hypotheses in fewer views cost infinitely much.
+    min_views: usize,
     /// Cost per unit of relative disagreement with a validated depth; 0 without the geometric term.
     geometric_weight: f32,
     /// Relative disagreement at which it stops growing.
@@ -26,6 +28,7 @@ impl CostRules {
         let weight = if with_geometric_term { options.geometric_weight } else { 0.0 };
         CostRules {
             aggregation: options.aggregation,
+            min_views: options.min_matched(),
             geometric_weight: (weight * 100.0) as f32,
             geometric_limit: (options.geometric_limit / 100.0) as f32,
             geometric_unknown: (options.geometric_unknown / 100.0) as f32,
@@ -165,7 +168,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
             self.candidates.sort_by(|a, b| a.least.total_cmp(&b.least));
             self.candidates.truncate(count);
         }
-        if self.candidates.len() >= 2 {
+        if self.candidates.len() >= self.rules.min_views {
             self.candidates.sort_by_key(|candidate| candidate.view);
             for (place, candidate) in self.candidates.iter().enumerate() {
                 self.views[place] = self.views[candidate.view];
@@ -229,7 +232,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     #[inline(always)]
     fn best_views(&mut self, food: &FoodSource, bound: f32, best: usize) -> f32 {
         let count = self.candidates.len();
-        if count <= 1 {
+        if count < self.rules.min_views {
             return f32::INFINITY;
         }
         let best = best.min(count);

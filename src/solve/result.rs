@@ -51,7 +51,13 @@ impl Steps {
         Ok(ViewResult {
             width: self.scaled(step, view).camera.width,
             estimate: own.maps(),
-            outcome: outcomes(self.scaled(step, view), &own.solved, &assessment, sources.len()),
+            outcome: outcomes(
+                self.scaled(step, view),
+                &own.solved,
+                &assessment,
+                sources.len(),
+                self.options.min_matched(),
+            ),
             cost: assessment.cost,
             sources,
             view_sets: assessment.sets,

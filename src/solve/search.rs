@@ -225,8 +225,11 @@ impl Steps {
         is_guided: bool,
         cancelled: &'b (dyn Fn() -> bool + Sync),
     ) -> Search<'b> {
-        // The paper's cost is infinite for a single view; the mean of the best needs two to be worth anything.
-        let min_views = if self.options.aggregation == Aggregation::AllViews { 0 } else { 2 };
+        // The paper starts no set again: its cost is infinite then.
+        let min_views = match self.options.aggregation {
+            Aggregation::AllViews => 0,
+            Aggregation::BestViews(_) => self.options.min_matched(),
+        };
         Search {
             reference,
             window: &self.window,
