@@ -148,7 +148,7 @@ static std::array<cv::Mat, 2> our_disparities(const cv::Mat &left, const cv::Mat
     options.set("window_radius", 3);
     options.set("window_step", 1);
     options.set("spatial_sigma", 1.5);
-    options.set("colour_sigma", 0.06);
+    options.set("colour_sigma", 0.08);
     const skep::Result result = skep::reconstruct(scene, options);
     std::array<cv::Mat, 2> out;
     for (std::size_t i = 0; i < 2; ++i) {
