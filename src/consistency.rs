@@ -65,7 +65,8 @@ impl ConsistencyRules {
 }
 
 /// Checks every solution of a reference view against the sources of its view set; `sources` are their states in the
-/// order of the reference's list, `None` of one that cannot speak. Gives the number of consistent sources and whether the solution is validated.
+/// order of the reference's list, `None` of one that cannot speak. Gives the number of consistent sources and whether
+/// the solution is validated.
 ///
 /// # Errors
 /// [`Error::Cancelled`].

@@ -9,6 +9,7 @@ use crate::image::PackedImage;
 use crate::kernels::{MAX_COST, PatchHomography, ReferencePatch, Window, patch_cost};
 use crate::simd::{Level, Simd, Task, dispatch};
 use glam::{DVec2, DVec3, Vec3};
+use std::mem::MaybeUninit;
 
 /// A grey image in the layout the kernels sample. Never changes: may be used from several threads at once.
 pub struct skep_samples {
@@ -251,8 +252,8 @@ pub unsafe extern "C" fn skep_patch_ncc(
         if count == 0 {
             return Ok(());
         }
-        // SAFETY: checked above; any bits are a float, and the batch only writes.
-        let ncc = unsafe { std::slice::from_raw_parts_mut(ncc, count) };
+        // SAFETY: checked above; the memory need not hold floats yet.
+        let ncc = unsafe { std::slice::from_raw_parts_mut(ncc.cast::<MaybeUninit<f32>>(), count) };
         dispatch(
             window.level,
             Batch { window: &window.window, reference, source, pixels, homographies, ncc },
@@ -268,7 +269,7 @@ struct Batch<'a> {
     source: &'a PackedImage,
     pixels: &'a [[u32; 2]],
     homographies: &'a [[f64; 9]],
-    ncc: &'a mut [f32],
+    ncc: &'a mut [MaybeUninit<f32>],
 }
 
 impl Task for Batch<'_> {
@@ -289,7 +290,7 @@ impl Task for Batch<'_> {
                     }
                     let about = about_pixel(homography, f64::from(x), f64::from(y));
                     let cost = patch_cost(simd, window, &patch, source, &about);
-                    *ncc = 1.0 - cost.min(MAX_COST);
+                    ncc.write(1.0 - cost.min(MAX_COST));
                 }
             },
         )

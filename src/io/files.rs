@@ -40,20 +40,22 @@ pub(super) fn stays_inside(name: &str) -> bool {
 /// What [`stays_inside`] demands.
 pub(super) const NAME_INSIDE: &str = "a path below the folder of images, without `..`";
 
-/// Makes a file appear in a second place; a file that cannot be linked there is copied.
+/// Copies a file, whole or not at all.
+pub(super) fn copy_file(from: &Path, to: &Path) -> Result<()> {
+    let mut source = File::open(from).map_err(|error| cannot_be_read(from, error))?;
+    write_file(to, |out| io::copy(&mut source, out).map(drop))
+}
+
+/// Makes a file appear in a second place without taking more room; one that cannot be linked there is copied.
 pub(super) fn link_or_copy(from: &Path, to: &Path) -> Result<()> {
-    let parent = to.parent().unwrap_or(Path::new("."));
-    let attempt = || -> io::Result<()> {
-        std::fs::create_dir_all(parent)?;
-        if std::fs::hard_link(from, to).is_ok() {
-            return Ok(());
-        }
-        let mut temporary = tempfile::NamedTempFile::new_in(parent)?;
-        io::copy(&mut File::open(from)?, temporary.as_file_mut())?;
-        temporary.persist(to)?;
-        Ok(())
-    };
-    attempt().map_err(|error| Error::file(to, format!("cannot be made from {}: {error}", from.display())))
+    if let Some(parent) = to.parent() {
+        let made = std::fs::create_dir_all(parent);
+        made.map_err(|error| Error::file(to, format!("cannot be written: {error}")))?;
+    }
+    match std::fs::hard_link(from, to) {
+        Ok(()) => Ok(()),
+        Err(_) => copy_file(from, to),
+    }
 }
 
 /// A file read from start to end, which never asks for more bytes than it holds.

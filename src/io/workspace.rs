@@ -4,7 +4,7 @@ use super::colmap_maps::{
     Grid, read_depth_map, read_normal_map, write_consistency_graph, write_depth_map, write_normal_map,
 };
 use super::colmap_model::ColmapModel;
-use super::files::{NAME_INSIDE, cannot_be_read, link_or_copy, stays_inside, write_file};
+use super::files::{NAME_INSIDE, cannot_be_read, copy_file, link_or_copy, stays_inside, write_file};
 use super::ply::{write_ply, write_visibility};
 use super::previews::{write_depth_preview, write_normal_preview, write_views_preview};
 use super::scene_folder::SceneFolder;
@@ -116,23 +116,26 @@ impl Workspace {
         })
     }
 
-    /// Makes the folder a workspace that COLMAP reads: photographs and model of the scene beside the maps. Photographs
-    /// are linked where the file system can, else copied; what is there already stays.
+    /// Makes the folder a workspace that COLMAP reads: photographs and model of the scene beside the maps. The model is
+    /// copied, as tools change models in place; photographs are linked where the file system can, else copied. What is
+    /// there already stays.
     pub fn adopt(&self, scene: &SceneFolder) -> Result<()> {
-        let ColmapModel { images, .. } = ColmapModel::read(&scene.sparse)?;
-        let photographs = images
-            .iter()
-            .map(|image| (scene.images.join(&image.name), self.folder.join("images").join(&image.name)));
-        let model = ["cameras", "images", "points3D"].into_iter().flat_map(|stem| {
-            ["bin", "txt"].map(|extension| {
-                let name = format!("{stem}.{extension}");
-                (scene.sparse.join(&name), self.folder.join("sparse").join(&name))
-            })
-        });
-        photographs
-            .chain(model)
-            .filter(|(from, to)| from.is_file() && !to.exists())
-            .try_for_each(|(from, to)| link_or_copy(&from, &to))
+        let is_new = |from: &Path, to: &Path| from.is_file() && !to.exists();
+        for image in ColmapModel::read(&scene.sparse)?.images {
+            let (from, to) = (scene.images.join(&image.name), self.folder.join("images").join(&image.name));
+            if is_new(&from, &to) {
+                link_or_copy(&from, &to)?;
+            }
+        }
+        for stem in ["cameras", "images", "points3D"] {
+            for name in ["bin", "txt"].map(|extension| format!("{stem}.{extension}")) {
+                let (from, to) = (scene.sparse.join(&name), self.folder.join("sparse").join(&name));
+                if is_new(&from, &to) {
+                    copy_file(&from, &to)?;
+                }
+            }
+        }
+        Ok(())
     }
 
     fn write_maps(

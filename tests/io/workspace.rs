@@ -172,4 +172,9 @@ fn a_workspace_takes_the_scene_in_and_lists_its_images() {
         }
     }
     assert_eq!(std::fs::read_to_string(own).unwrap(), "# mine\n", "what is there stays");
+    // A model that is changed in the workspace is not changed in the scene.
+    let before = std::fs::read(outside.sparse.join("cameras.txt")).unwrap();
+    let cameras = workspace.folder().join("sparse/cameras.txt");
+    std::fs::OpenOptions::new().write(true).truncate(true).open(cameras).unwrap();
+    assert_eq!(std::fs::read(outside.sparse.join("cameras.txt")).unwrap(), before);
 }

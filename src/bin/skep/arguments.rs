@@ -137,7 +137,7 @@ What it makes, in COLMAP's layouts:
   stereo/depth_maps/NAME.photometric.bin    the raw estimate of every pixel
   stereo/depth_maps/NAME.geometric.bin      only what other views confirm
   stereo/normal_maps, stereo/consistency_graphs    likewise: normals, and source views of each pixel
-  images, sparse                   the scene, linked: the folder is a workspace of COLMAP's, so that
+  images, sparse                   the scene again: the folder is a workspace of COLMAP's, so that
                                    `colmap stereo_fusion --workspace_path DIR ...` takes it as it is
   report.json                      counts, times and options; written last
 
