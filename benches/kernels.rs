@@ -1,4 +1,7 @@
-//! How long the parts of the method take: kernels on each back-end, a whole small search, fusion.
+//! How fast the kernels are on each instruction set, one thread: `cargo bench --bench kernels`.
+//!
+//! An element is a patch, or a sample where the name says samples: Melem/s are millions of NCC evaluations (samples) a
+//! second. The patches are those of a made view at its true planes, so that cache hits are those of a converged search.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -8,48 +11,50 @@ use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec2;
 use skep::camera::Camera;
-use skep::fusion::{FusionView, fuse};
 use skep::image::PackedImage;
-use skep::kernels::{PatchHomography, ReferencePatch, RelativePose, SlantedPlane, Window, patch_cost};
-use skep::simd::{Level, Simd, Task, dispatch};
-use skep::{FusionOptions, Options, Scale, ignore_progress, reconstruct};
+use skep::kernels::{
+    PatchHomography, ReferencePatch, RelativePose, SlantedPlane, Window, patch_cost, patch_costs,
+};
+use skep::simd::{LANES, Level, Simd, Task, dispatch};
 use std::hint::black_box;
 
-/// The window of 36 samples.
-fn window() -> Window {
-    let Options { window_radius, window_step, spatial_sigma, colour_sigma, min_variance, .. } =
-        Options::default();
-    Window::new(window_radius, window_step, spatial_sigma, colour_sigma, min_variance)
-}
+/// Source views of the patches that are matched with several.
+const VIEWS: [usize; 4] = [MIDDLE - 2, MIDDLE - 1, MIDDLE + 1, MIDDLE + 2];
 
-/// Pixels of the reference view with the homographies of their true planes to one source.
+/// Pixels of the reference view with their true planes and the homographies of these to each source view.
 struct Patches {
     window: Window,
     reference: PackedImage,
-    source: PackedImage,
     pixels: Vec<(usize, usize)>,
+    planes: Vec<SlantedPlane>,
+    sources: Vec<Source>,
+}
+
+struct Source {
+    image: PackedImage,
+    pose: RelativePose,
     homographies: Vec<PatchHomography>,
 }
 
 impl Patches {
-    fn new(made: &Procedural) -> Patches {
-        let (view, source) = (&made.views[MIDDLE], &made.views[MIDDLE + 1]);
+    fn new(made: &Procedural, window: Window) -> Patches {
+        let view = &made.views[MIDDLE];
         let camera = &view.camera;
-        let pose = RelativePose::new(camera, &source.camera);
         let wanted = |&(x, y): &(usize, usize)| x % 4 == 0 && y % 4 == 0;
         let (width, height) = (camera.width as usize, camera.height as usize);
         let pixels: Vec<(usize, usize)> =
             (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).filter(wanted).collect();
-        let homography = |&(x, y): &(usize, usize)| {
-            pose.homography(pose.at_infinity(x as f32, y as f32), &true_plane(made, camera, (x, y)))
+        let planes: Vec<SlantedPlane> = pixels.iter().map(|&pixel| true_plane(made, camera, pixel)).collect();
+        let source = |view: usize| {
+            let pose = RelativePose::new(camera, &made.views[view].camera);
+            let homography = |(&(x, y), plane): (&(usize, usize), &SlantedPlane)| {
+                pose.homography(pose.at_infinity(x as f32, y as f32), plane)
+            };
+            let image = PackedImage::new(&made.views[view].picture);
+            Source { image, pose, homographies: pixels.iter().zip(&planes).map(homography).collect() }
         };
-        Patches {
-            window: window(),
-            reference: PackedImage::new(&view.picture),
-            source: PackedImage::new(&source.picture),
-            homographies: pixels.iter().map(homography).collect(),
-            pixels,
-        }
+        let sources = VIEWS.map(source).into();
+        Patches { window, reference: PackedImage::new(&view.picture), pixels, planes, sources }
     }
 }
 
@@ -83,25 +88,118 @@ impl Task for Sample<'_> {
     }
 }
 
-/// Compares one sampled patch with what every homography makes of it.
+/// Compares one sampled patch with what every plane makes of it in the first source view: homography and NCC.
 struct Compare<'a>(&'a Patches, &'a ReferencePatch);
 
 impl Task for Compare<'_> {
     type Output = f32;
 
     fn run<S: Simd>(self, simd: S) -> f32 {
-        let Compare(Patches { window, source, homographies, .. }, patch) = self;
+        let Compare(Patches { window, pixels, planes, sources, .. }, patch) = self;
+        let Source { image, pose, .. } = &sources[0];
         simd.vectorize(
             #[inline(always)]
             || {
                 let mut sum = 0.0;
-                for homography in homographies {
-                    sum += patch_cost(simd, window, patch, source, homography);
+                for (&(x, y), plane) in pixels.iter().zip(planes) {
+                    let homography = pose.homography(pose.at_infinity(x as f32, y as f32), plane);
+                    sum += patch_cost(simd, window, patch, image, &homography);
                 }
                 sum
             },
         )
     }
+}
+
+/// Samples each patch of the reference and compares it with all source views.
+struct CompareViews<'a>(&'a Patches);
+
+impl Task for CompareViews<'_> {
+    type Output = f32;
+
+    fn run<S: Simd>(self, simd: S) -> f32 {
+        let Patches { window, reference, pixels, planes, sources } = self.0;
+        let mut patch = ReferencePatch::new(window);
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut sum = 0.0;
+                for (&(x, y), plane) in pixels.iter().zip(planes) {
+                    patch.sample(simd, window, reference, x, y);
+                    let view = |index: usize| {
+                        let Source { image, pose, .. } = &sources[index];
+                        (image, pose.homography(pose.at_infinity(x as f32, y as f32), plane))
+                    };
+                    sum += patch_costs(simd, window, &patch, view, sources.len())[0];
+                }
+                sum
+            },
+        )
+    }
+}
+
+/// The homographies alone.
+struct Homographies<'a>(&'a Patches);
+
+impl Task for Homographies<'_> {
+    type Output = ();
+
+    fn run<S: Simd>(self, simd: S) {
+        let Patches { pixels, planes, sources, .. } = self.0;
+        let pose = &sources[0].pose;
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                for (&(x, y), plane) in pixels.iter().zip(planes) {
+                    black_box(pose.homography(pose.at_infinity(x as f32, y as f32), plane));
+                }
+            },
+        );
+    }
+}
+
+/// Nothing but the bytes that [`Compare`] reads, from addresses worked out before: the machine's limit.
+struct Gather<'a>(&'a PackedImage, &'a [[[f32; LANES]; 2]]);
+
+impl Task for Gather<'_> {
+    type Output = [f32; LANES];
+
+    fn run<S: Simd>(self, simd: S) -> [f32; LANES] {
+        let Gather(image, places) = self;
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                let mut sums = [simd.splat(0.0); 4];
+                for [x, y] in places {
+                    let taps = simd.gather_bytes(&image.pairs, image.stride(), simd.load(x), simd.load(y));
+                    sums = std::array::from_fn(|tap| simd.add(sums[tap], taps[tap]));
+                }
+                let [a, b, c, d] = sums;
+                simd.store(simd.add(simd.add(a, b), simd.add(c, d)))
+            },
+        )
+    }
+}
+
+/// Where the 36 samples of every patch fall in the first source view, eight a vector, the last one filled up.
+fn places(patches: &Patches) -> Vec<[[f32; LANES]; 2]> {
+    let Source { image, homographies, .. } = &patches.sources[0];
+    let offsets: Vec<(f32, f32)> =
+        (-5..=5).step_by(2).flat_map(|y| (-5..=5).step_by(2).map(move |x| (x as f32, y as f32))).collect();
+    let mut places = Vec::new();
+    for PatchHomography { centre, along_x, along_y } in homographies {
+        for eight in offsets.chunks(LANES) {
+            let place = |lane: usize| {
+                let (dx, dy) = eight[lane.min(eight.len() - 1)];
+                let point = *centre + dx * *along_x + dy * *along_y;
+                let inside = |at: f32, size: usize| at.clamp(0.0, (size - 1) as f32).floor();
+                (inside(point.x / point.z, image.width), inside(point.y / point.z, image.height))
+            };
+            places
+                .push([std::array::from_fn(|lane| place(lane).0), std::array::from_fn(|lane| place(lane).1)]);
+        }
+    }
+    places
 }
 
 fn on_every_level(group: &mut BenchmarkGroup<WallTime>, mut run: impl FnMut(Level)) {
@@ -111,66 +209,42 @@ fn on_every_level(group: &mut BenchmarkGroup<WallTime>, mut run: impl FnMut(Leve
 }
 
 fn kernels(criterion: &mut Criterion) {
-    let patches = Patches::new(&procedural::plane_and_sphere());
-    let sampled = dispatch(Level::Scalar, Sample(&patches));
-
-    let mut group = criterion.benchmark_group("sample the reference patch");
-    group.throughput(Throughput::Elements(patches.pixels.len() as u64));
-    on_every_level(&mut group, |level| {
-        black_box(dispatch(level, Sample(&patches)));
-    });
-    group.finish();
-
-    let mut group = criterion.benchmark_group("patch cost");
-    group.throughput(Throughput::Elements(patches.homographies.len() as u64));
-    on_every_level(&mut group, |level| {
-        black_box(dispatch(level, Compare(&patches, black_box(&sampled))));
-    });
-    group.finish();
-}
-
-/// One search of each of three small views: colonies filled, one iteration, the check.
-fn search(criterion: &mut Criterion) {
-    let mut made = procedural::plane_and_sphere().only(&[MIDDLE - 1, MIDDLE, MIDDLE + 1]);
-    // A band of each image is enough.
-    for view in &mut made.views {
-        let width = view.camera.width as usize;
-        view.mask =
-            Some((0..view.camera.pixels()).map(|pixel| (40..56).contains(&(pixel / width))).collect());
-    }
-    let scene = made.scene();
-    let scale = Scale { halvings: 0, foods: 4, first_iterations: 1, cycles: 0, cycle_iterations: 0 };
-    let options = Options { threads: 1, scales: vec![scale], ..Options::default() };
-    let mut group = criterion.benchmark_group("search");
-    group.sample_size(10);
-    group.bench_function("one iteration", |bencher| {
-        bencher.iter(|| reconstruct(black_box(&scene), &options, &ignore_progress).unwrap());
-    });
-    group.finish();
-}
-
-fn fusion(criterion: &mut Criterion) {
     let made = procedural::plane_and_sphere();
-    let count = made.views.len() as u32;
-    let overlaps: Vec<Vec<u32>> =
-        (0..count).map(|view| (0..count).filter(|&other| other != view).collect()).collect();
-    let views: Vec<FusionView> = (made.views.iter().zip(&made.truth).zip(&overlaps))
-        .map(|((view, maps), overlap)| FusionView {
-            camera: &view.camera,
-            maps,
-            picture: Some(&view.picture),
-            overlap,
-        })
-        .collect();
-    let options: FusionOptions = Options::default().fusion;
-    let pixels: u64 = made.views.iter().map(|view| view.camera.pixels() as u64).sum();
-    let mut group = criterion.benchmark_group("fusion");
-    group.throughput(Throughput::Elements(pixels)).sample_size(10);
-    group.bench_function("exact maps", |bencher| {
-        bencher.iter(|| fuse(black_box(&views), &options, &ignore_progress).unwrap());
+    let mut group_of = |name: &str, elements: usize, run: &mut dyn FnMut(Level)| {
+        let mut group = criterion.benchmark_group(name);
+        group.throughput(Throughput::Elements(elements as u64));
+        on_every_level(&mut group, run);
+        group.finish();
+    };
+    let windows = [
+        ("24 samples", Window::disc(5, 2, 3.0, 0.03, 1e-5)),
+        ("36 samples", Window::new(5, 2, 3.0, 0.03, 1e-5)),
+        ("121 samples", Window::new(5, 1, 3.0, 0.03, 1e-5)),
+    ];
+    for (name, window) in windows {
+        let patches = Patches::new(&made, window);
+        let sampled = dispatch(Level::Scalar, Sample(&patches));
+        let count = patches.pixels.len();
+        group_of(&format!("homography and NCC of a patch, {name}"), count, &mut |level| {
+            black_box(dispatch(level, Compare(&patches, black_box(&sampled))));
+        });
+        group_of(&format!("a pixel with 4 source views, {name}"), count * VIEWS.len(), &mut |level| {
+            black_box(dispatch(level, CompareViews(black_box(&patches))));
+        });
+        group_of(&format!("reference side of a patch, {name}"), count, &mut |level| {
+            black_box(dispatch(level, Sample(black_box(&patches))));
+        });
+    }
+    let patches = Patches::new(&made, Window::new(5, 2, 3.0, 0.03, 1e-5));
+    let count = patches.pixels.len();
+    let places = places(&patches);
+    group_of("reading the taps of 36-sample patches, samples", 36 * count, &mut |level| {
+        black_box(dispatch(level, Gather(&patches.sources[0].image, black_box(&places))));
     });
-    group.finish();
+    group_of("homography alone", count, &mut |level| {
+        dispatch(level, Homographies(black_box(&patches)));
+    });
 }
 
-criterion_group!(benches, kernels, search, fusion);
+criterion_group!(benches, kernels);
 criterion_main!(benches);

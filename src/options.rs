@@ -70,6 +70,8 @@ pub struct Options {
     pub window_radius: u32,
     /// Distance between samples of the window, in pixels.
     pub window_step: u32,
+    /// Whether its corners are left out: a disc of samples instead of a square.
+    pub round_window: bool,
     /// Spatial sigma of the bilateral weight, in pixels.
     pub spatial_sigma: f64,
     /// Colour sigma of the bilateral weight, intensities in [0, 1].
@@ -87,6 +89,14 @@ pub struct Options {
     pub restart_spread: f64,
     /// How far the normals of those colonies are tilted, as the half side of a cube added to the unit normal.
     pub restart_tilt: f64,
+
+    /// Cost of a plane that the validated planes of all four neighbours contradict, where they look alike; 0 for no
+    /// smoothness (`paper`).
+    pub smoothness: f64,
+    /// Relative difference of depths that contradicts altogether; smaller ones in proportion.
+    pub smoothness_depth: f64,
+    /// Angle between normals that contradicts altogether, in degrees.
+    pub smoothness_normal: f64,
 
     /// Whether the view set of each pixel is refined by incidence and visibility. Off keeps the start set.
     pub view_selection: bool,
@@ -129,12 +139,13 @@ pub struct Options {
 
 impl Options {
     /// Names of the presets.
-    pub const PRESETS: [&'static str; 2] = ["default", "paper"];
+    pub const PRESETS: [&'static str; 3] = ["default", "fast", "paper"];
 
     /// The preset of this name.
     pub fn preset(name: &str) -> Result<Options> {
         match name {
             "default" => Ok(Options::default()),
+            "fast" => Ok(Options::fast()),
             "paper" => Ok(Options::paper()),
             _ => Err(Error::argument("preset", name, format!("one of {}", Self::PRESETS.join(", ")))),
         }
@@ -158,6 +169,7 @@ impl Options {
             stop_share: 0.01,
             window_radius: 5,
             window_step: 2,
+            round_window: false,
             spatial_sigma: 5.0,
             colour_sigma: 0.2,
             min_variance: 1e-5,
@@ -165,6 +177,9 @@ impl Options {
             focused_views: 0,
             restart_spread: 0.0,
             restart_tilt: 0.0,
+            smoothness: 0.0,
+            smoothness_depth: 0.01,
+            smoothness_normal: 40.0,
             view_selection: true,
             triangulation_angle: (10.0, 30.0),
             max_sources: 0,
@@ -182,6 +197,20 @@ impl Options {
             consistent_share: 0.7,
             occluders_abstain: false,
             fusion: FusionOptions { depth_tolerance: 0.01, normal_tolerance: 30.0, min_views: 4 },
+        }
+    }
+
+    /// The default with fewer iterations and source views: to look at a scene, or where time is short.
+    pub fn fast() -> Options {
+        Options {
+            scales: vec![
+                Scale { halvings: 1, foods: 3, first_iterations: 4, cycles: 2, cycle_iterations: 1 },
+                Scale { halvings: 0, foods: 2, first_iterations: 1, cycles: 1, cycle_iterations: 1 },
+            ],
+            max_sources: 10,
+            smoothness: 0.3,
+            reward: 0.05,
+            ..Options::default()
         }
     }
 
@@ -268,14 +297,16 @@ impl Default for Options {
         Options {
             scales: vec![
                 Scale { halvings: 1, foods: 4, first_iterations: 6, cycles: 4, cycle_iterations: 1 },
-                Scale { halvings: 0, foods: 3, first_iterations: 2, cycles: 3, cycle_iterations: 1 },
+                Scale { halvings: 0, foods: 2, first_iterations: 2, cycles: 3, cycle_iterations: 1 },
             ],
+            round_window: true,
             spatial_sigma: 3.0,
             colour_sigma: 0.03,
             aggregation: Aggregation::BestViews(4),
             focused_views: 5,
             restart_spread: 0.01,
             restart_tilt: 0.3,
+            smoothness: 0.1,
             triangulation_angle: (4.0, 40.0),
             max_sources: 16,
             reward: 0.1,

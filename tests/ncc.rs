@@ -3,7 +3,7 @@
 use glam::Vec3;
 use proptest::prelude::*;
 use skep::image::{PackedImage, Picture};
-use skep::kernels::{MAX_COST, PatchHomography, ReferencePatch, Window, patch_cost};
+use skep::kernels::{MAX_COST, PatchHomography, ReferencePatch, Window, patch_cost, patch_costs};
 use skep::simd::{Level, Simd, Task, dispatch};
 
 const WIDTH: u32 = 24;
@@ -54,7 +54,16 @@ impl Task for Cost<'_> {
             #[inline(always)]
             || {
                 patch.sample(simd, &window, &reference, *x, *y);
-                patch_cost(simd, &window, &patch, &source, homography)
+                let cost = patch_cost(simd, &window, &patch, &source, homography);
+                // Beside others, in any lane, it is the same.
+                let other = PatchHomography { centre: homography.centre + Vec3::X, ..*homography };
+                for (lane, count) in [(0, 1), (2, 5), (7, 8)] {
+                    let view = |index| (&source, if index == lane { *homography } else { other });
+                    let costs = patch_costs(simd, &window, &patch, view, count);
+                    assert_eq!(costs[lane].to_bits(), cost.to_bits(), "lane {lane}: {costs:?}");
+                    assert!(costs[count..].iter().all(|&cost| cost == MAX_COST));
+                }
+                cost
             },
         )
     }
@@ -316,4 +325,7 @@ fn a_window_counts_its_samples() {
     assert_eq!(window().samples(), 36);
     assert_eq!(Window::new(5, 1, 5.0, 0.2, 1e-5).samples(), 121);
     assert_eq!(Window::new(1, 3, 5.0, 0.2, 1e-5).samples(), 1);
+    // Without three samples in each corner; without the corners at a distance of 2.8 and more.
+    assert_eq!(Window::disc(5, 2, 5.0, 0.2, 1e-5).samples(), 24);
+    assert_eq!(Window::disc(2, 1, 5.0, 0.2, 1e-5).samples(), 21);
 }

@@ -10,8 +10,9 @@ fn the_presets_are_in_order_and_found_by_name() {
     }
     assert_eq!(Options::preset("paper").unwrap(), Options::paper());
     assert_eq!(Options::preset("default").unwrap(), Options::default());
-    let error = Options::preset("fast").unwrap_err().to_string();
-    assert!(error.contains("fast") && error.contains("default, paper"), "{error}");
+    assert_eq!(Options::preset("fast").unwrap(), Options::fast());
+    let error = Options::preset("quick").unwrap_err().to_string();
+    assert!(error.contains("quick") && error.contains("default, fast, paper"), "{error}");
 }
 
 /// What spoils an option, and the option's name and the value in the error.
@@ -40,6 +41,9 @@ fn an_option_out_of_range_is_named_with_its_value() {
         (|o| o.triangulation_angle = (20.0, 10.0), "triangulation_angle.max", "10"),
         (|o| o.max_incident_angle = 91.0, "max_incident_angle", "91"),
         (|o| o.occlusion_margin = -0.1, "occlusion_margin", "-0.1"),
+        (|o| o.smoothness = -0.1, "smoothness", "-0.1"),
+        (|o| o.smoothness_depth = 0.0, "smoothness_depth", "0"),
+        (|o| o.smoothness_normal = 200.0, "smoothness_normal", "200"),
         (|o| o.reward = f64::INFINITY, "reward", "inf"),
         (|o| o.geometric_weight = -1.0, "geometric_weight", "-1"),
         (|o| o.geometric_limit = f64::NAN, "geometric_limit", "NaN"),

@@ -65,6 +65,9 @@ impl Operation for Arithmetic {
             simd.min(a, b),
             simd.mul_add(a, b, c),
             simd.splat(simd.sum(a)),
+            simd.sqrt(a),
+            simd.splat(f32::from(simd.at_least(a, b))),
+            simd.sums(&[a, b, c, a, b, c, a, b]),
         ];
         results.map(|lanes| simd.store(lanes)).to_vec()
     }
@@ -115,6 +118,20 @@ fn any_lanes() -> impl Strategy<Value = Lanes> {
 
 fn whole_lanes(below: u32) -> impl Strategy<Value = Lanes> {
     prop::array::uniform8((0..below).prop_map(|lane| lane as f32))
+}
+
+#[test]
+fn eight_sums_stand_in_the_order_of_their_vectors() {
+    #[derive(Clone, Copy)]
+    struct Sums;
+    impl Operation for Sums {
+        fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
+            let vectors = std::array::from_fn(|vector| simd.splat(vector as f32));
+            vec![simd.store(simd.sums(&vectors))]
+        }
+    }
+    check(Sums).unwrap();
+    assert_eq!(Sums.run(Scalar), [[0.0, 8.0, 16.0, 24.0, 32.0, 40.0, 48.0, 56.0]]);
 }
 
 proptest! {

@@ -7,8 +7,10 @@ use glam::{DVec3, Vec3};
 use skep::camera::Camera;
 use skep::image::{PackedImage, Picture};
 use skep::kernels::SlantedPlane;
+use skep::simd::{Level, Simd, Task, dispatch};
 use skep::views::{
-    Reference, Source, SourceLists, ViewRules, ViewSets, faces_source, is_occluded, source_lists,
+    Placement, Placements, Reference, Source, SourceLists, ViewRules, ViewSets, faces_source, is_occluded,
+    source_lists,
 };
 use skep::{DepthRange, Options, Scene, SparsePoint, View};
 
@@ -298,4 +300,58 @@ fn at_most_so_many_sources_are_taken() {
     assert_eq!(list(3).len(), 3);
     assert_eq!(list(2).len(), 2);
     assert_eq!(list(1).len(), 1);
+}
+
+/// Where the points of a pixel at these depths fall in the sources of a set.
+struct Place<'a>(&'a Reference<'a>, (f32, f32), &'a [u32], &'a [f32]);
+
+impl Task for Place<'_> {
+    type Output = Vec<Vec<Placement>>;
+
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let Place(reference, (x, y), set, depths) = self;
+        let mut placements = Placements::new(simd, reference);
+        placements.go_to(x, y, set);
+        let place = |&depth: &f32| {
+            let mut found = Vec::new();
+            placements.find(depth, |placement| found.push(placement));
+            found
+        };
+        depths.iter().map(place).collect()
+    }
+}
+
+#[test]
+fn eight_sources_at_once_are_found_where_each_alone_is() {
+    let angles: Vec<f64> = (0..11).map(|view| f64::from(view) * 34.0 - 170.0).collect();
+    let mut views = Views::at_angles(&angles);
+    views.sources[3].cx += 15.0;
+    let mut reference = Reference::new(&views.reference, &views.image, RANGE);
+    reference.sources = (views.sources.iter())
+        .map(|camera| Source::new(&views.reference, camera, &views.image, &[]))
+        .collect();
+    let depths = [0.001, 1.0, 2.5, 3.9, DEPTH, 4.1, 5.0, 8.0, 1e6];
+    let (mut inside, mut outside) = (0, 0);
+    for set in [0x7ff, 0x555, 0x400, 0u32] {
+        for (x, y) in [CENTRE, (0.0, 0.0), (40.0, 30.0), (7.0, 22.0)] {
+            let expected: Vec<Vec<Placement>> = (depths.iter())
+                .map(|depth| {
+                    let place = |source: usize| {
+                        let Source { pose, .. } = &reference.sources[source];
+                        let centre = pose.at_infinity(x, y) + pose.epipole * (1.0 / depth);
+                        let at = reference.sources[source].project(centre)?;
+                        Some(Placement { source, centre, x: at.x, y: at.y })
+                    };
+                    (0..11).filter(|source| set >> source & 1 != 0).filter_map(place).collect()
+                })
+                .collect();
+            inside += expected.iter().map(Vec::len).sum::<usize>();
+            outside += expected.iter().map(|found| set.count_ones() as usize - found.len()).sum::<usize>();
+            for level in Level::ALL.into_iter().filter(|level| level.is_available()) {
+                let found = dispatch(level, Place(&reference, (x, y), &[set], &depths));
+                assert_eq!(found, expected, "{}", level.name());
+            }
+        }
+    }
+    assert!(inside > 50 && outside > 50, "{inside} inside and {outside} outside");
 }

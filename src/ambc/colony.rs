@@ -53,15 +53,3 @@ impl Colonies {
 pub fn colour(x: usize, y: usize) -> usize {
     (x + y) % 2
 }
-
-/// Puts the best food source first; its trial count moves with it. Of equals the earlier stays ahead.
-#[inline(always)]
-pub fn best_first(foods: &mut [FoodSource]) {
-    let mut best = 0;
-    for index in 1..foods.len() {
-        if foods[index].cost < foods[best].cost {
-            best = index;
-        }
-    }
-    foods.swap(0, best);
-}

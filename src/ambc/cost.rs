@@ -1,12 +1,15 @@
 //! Matching cost of a hypothesis over the source views of its pixel (section 5.2 of the paper).
 
-use super::food::FoodSource;
-use crate::kernels::{MAX_COST, ReferencePatch, Window, patch_cost};
+use super::colony::Colonies;
+use super::food::{FoodSource, cost_to_beat};
+use super::smoothness::{SmoothnessRules, Surroundings};
+use crate::kernels::{MAX_COST, ReferencePatch, SlantedPlane, Window, patch_costs};
 use crate::maps::Counts;
 use crate::options::{Aggregation, Options};
-use crate::simd::Simd;
-use crate::views::{Reference, Source, ViewSets};
+use crate::simd::{LANES, Simd};
+use crate::views::{Placements, Reference, Source, ViewSets};
 use glam::Vec3;
+use std::cmp::Ordering;
 
 /// How source views' costs become a hypothesis' cost.
 #[derive(Debug, Clone, Copy)]
@@ -20,6 +23,7 @@ pub struct CostRules {
     geometric_limit: f32,
     /// Relative disagreement where the source has no validated depth.
     geometric_unknown: f32,
+    smoothness: SmoothnessRules,
 }
 
 impl CostRules {
@@ -32,6 +36,11 @@ impl CostRules {
             geometric_weight: (weight * 100.0) as f32,
             geometric_limit: (options.geometric_limit / 100.0) as f32,
             geometric_unknown: (options.geometric_unknown / 100.0) as f32,
+            smoothness: SmoothnessRules {
+                weight: options.smoothness as f32,
+                depth_scale: options.smoothness_depth as f32,
+                normal_scale: (1.0 - options.smoothness_normal.to_radians().cos()) as f32,
+            },
         }
     }
 
@@ -53,19 +62,18 @@ impl CostRules {
 /// The largest k of [`Aggregation::BestViews`].
 pub const MAX_BEST_VIEWS: usize = 8;
 
-/// A source view of the pixel at work.
-#[derive(Debug, Clone, Copy)]
-struct PixelView {
-    source: usize,
-    at_infinity: Vec3,
-}
-
-/// A source view that has the hypothesis at work in its image, with the least its cost can be.
+/// A source view that has the hypothesis at work in its image.
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
-    view: usize,
+    source: usize,
+    /// Where the hypothesis falls, homogeneous.
+    centre: Vec3,
+    /// The least it can cost in this view: the geometric term, and the photometric one as soon as it is known.
     least: f32,
 }
+
+/// Views matched at once, between two looks whether a hypothesis can still win.
+const BATCH: usize = LANES;
 
 /// Evaluates hypotheses of one pixel after the other.
 pub struct Evaluator<'a, S: Simd> {
@@ -74,9 +82,11 @@ pub struct Evaluator<'a, S: Simd> {
     window: &'a Window,
     rules: CostRules,
     patch: ReferencePatch,
+    has_texture: bool,
     ray: Vec3,
-    views: Vec<PixelView>,
+    placements: Placements<S>,
     candidates: Vec<Candidate>,
+    surroundings: Surroundings,
     /// Work done so far.
     pub counts: Counts,
 }
@@ -95,9 +105,11 @@ impl<'a, S: Simd> Evaluator<'a, S> {
             window,
             rules,
             patch: ReferencePatch::new(window),
+            has_texture: false,
             ray: Vec3::Z,
-            views: Vec::new(),
-            candidates: Vec::new(),
+            placements: Placements::new(simd, reference),
+            candidates: Vec::with_capacity(reference.sources.len()),
+            surroundings: Surroundings::new(rules.smoothness),
             counts: Counts::default(),
         }
     }
@@ -118,20 +130,22 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     #[inline(always)]
     pub fn go_to(&mut self, x: usize, y: usize, set: &[u32]) {
         self.patch.sample(self.simd, self.window, self.reference.image, x, y);
+        self.has_texture = self.patch.has_texture(self.window);
         let (x, y) = (x as f32, y as f32);
         self.ray = self.reference.ray(x, y);
-        self.views.clear();
-        let sources = &self.reference.sources;
-        self.views.extend(
-            ViewSets::iter_words(set)
-                .map(|source| PixelView { source, at_infinity: sources[source].pose.at_infinity(x, y) }),
-        );
+        self.placements.go_to(x, y, set);
+    }
+
+    /// Lets the planes of the pixel's neighbours have a say.
+    #[inline(always)]
+    pub fn look_around(&mut self, neighbours: &Colonies, (x, y): (usize, usize)) {
+        self.surroundings.look(self.reference, self.window, neighbours, (x, y));
     }
 
     /// Whether the pixel's patch can be matched.
     #[inline(always)]
     pub fn has_texture(&self) -> bool {
-        self.patch.has_texture(self.window)
+        self.has_texture
     }
 
     /// The cost of a hypothesis if it is below `bound`, else infinity: costs are not negative, so the sum over views
@@ -146,67 +160,106 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         if cost < bound { cost } else { f32::INFINITY }
     }
 
+    /// Puts `trial` in the place of a food source if it is better; `reward` is a bonus on its fitness.
+    #[inline(always)]
+    pub fn challenge(&mut self, food: &mut FoodSource, trial: &FoodSource, reward: f32) -> bool {
+        let bound =
+            cost_to_beat(food.cost + self.surroundings.cost(food), reward) - self.surroundings.cost(trial);
+        let cost = self.cost(trial, bound);
+        let wins = cost < bound;
+        if wins {
+            *food = FoodSource { cost, ..*trial };
+        }
+        wins
+    }
+
+    /// Puts the best food source first; its trial count moves with it. Of equals the earlier stays ahead.
+    #[inline(always)]
+    pub fn best_first(&self, foods: &mut [FoodSource]) {
+        let mut best = (0, f32::INFINITY);
+        for (index, food) in foods.iter().enumerate() {
+            let cost = food.cost + self.surroundings.cost(food);
+            if cost < best.1 {
+                best = (index, cost);
+            }
+        }
+        foods.swap(0, best.0);
+    }
+
     /// The mean of `1 - NCC` over the views that have the hypothesis in their image: the confidence.
     #[inline(always)]
     pub fn mean_photometric_cost(&mut self, food: &FoodSource) -> f32 {
         self.find_candidates(food);
-        let mut sum = 0.0;
-        for index in 0..self.candidates.len() {
-            sum += self.photometric_cost(food, self.candidates[index].view);
-        }
+        self.candidates.iter_mut().for_each(|candidate| candidate.least = 0.0);
+        self.add_photometric_costs(&food.plane(self.reference, self.ray), 0, self.candidates.len());
+        let sum: f32 = self.candidates.iter().map(|candidate| candidate.least).sum();
         if self.candidates.is_empty() { MAX_COST } else { sum / self.candidates.len() as f32 }
     }
 
-    /// Keeps, for the hypotheses to come, only the `count` views in which this one costs least; writes them to `set`.
+    /// Keeps, for the hypotheses to come, only `count` views, writes them to `set` and gives the cost of this one: the
+    /// views whose validated surfaces agree best with it, or, where too few do, those in which it costs least.
     #[inline(always)]
-    pub fn focus(&mut self, food: &FoodSource, count: usize, set: &mut [u32]) {
+    pub fn focus(&mut self, food: &FoodSource, count: usize, set: &mut [u32]) -> f32 {
         self.find_candidates(food);
-        if self.candidates.len() > count {
-            for index in 0..self.candidates.len() {
-                self.candidates[index].least += self.photometric_cost(food, self.candidates[index].view);
+        let unknown = self.rules.geometric_weight * self.rules.geometric_unknown;
+        let agreeing = self.candidates.iter().filter(|candidate| candidate.least < unknown).count();
+        let all = self.candidates.len();
+        if all > count {
+            if agreeing < count {
+                self.add_photometric_costs(&food.plane(self.reference, self.ray), 0, all);
             }
-            self.candidates.sort_by(|a, b| a.least.total_cmp(&b.least));
+            let rank = |candidate: &Candidate| (candidate.least, candidate.source);
+            self.candidates.sort_unstable_by(|a, b| rank(a).partial_cmp(&rank(b)).unwrap_or(Ordering::Equal));
             self.candidates.truncate(count);
         }
         if self.candidates.len() >= self.rules.min_views {
-            self.candidates.sort_by_key(|candidate| candidate.view);
-            for (place, candidate) in self.candidates.iter().enumerate() {
-                self.views[place] = self.views[candidate.view];
+            set.fill(0);
+            for candidate in &self.candidates {
+                ViewSets::insert_into(set, candidate.source);
             }
-            self.views.truncate(self.candidates.len());
+            self.placements.keep(set);
         }
-        set.fill(0);
-        for view in &self.views {
-            ViewSets::insert_into(set, view.source);
+        match self.rules.aggregation {
+            Aggregation::BestViews(best) if all > count && agreeing < count => {
+                let best = (best as usize).min(count);
+                sum_of_least(&self.candidates, best) / best as f32
+            }
+            _ => self.cost(food, f32::INFINITY),
         }
     }
 
     /// A view whose image the hypothesis' centre leaves does not count for it.
     #[inline(always)]
     fn find_candidates(&mut self, food: &FoodSource) {
-        let inverse_depth = 1.0 / food.depth;
-        self.candidates.clear();
-        for (view, pixel) in self.views.iter().enumerate() {
-            let source = &self.reference.sources[pixel.source];
-            let point = pixel.at_infinity + source.pose.epipole * inverse_depth;
-            if let Some(at) = source.project(point) {
-                let least = self.rules.geometric_cost(source, at.x, at.y, point.z * food.depth);
-                self.candidates.push(Candidate { view, least });
-            }
-        }
+        let Evaluator { placements, candidates, reference, rules, .. } = self;
+        candidates.clear();
+        placements.find(food.depth, |at| {
+            let depth = at.centre.z * food.depth;
+            let least = rules.geometric_cost(&reference.sources[at.source], at.x, at.y, depth);
+            candidates.push(Candidate { source: at.source, centre: at.centre, least });
+        });
     }
 
+    /// Adds what the hypothesis costs in these candidates by their images.
     #[inline(always)]
-    fn photometric_cost(&mut self, food: &FoodSource, view: usize) -> f32 {
-        if !self.has_texture() {
-            return MAX_COST;
+    fn add_photometric_costs(&mut self, plane: &SlantedPlane, start: usize, end: usize) {
+        if !self.has_texture {
+            self.candidates[start..end].iter_mut().for_each(|candidate| candidate.least += MAX_COST);
+            return;
         }
-        self.counts.ncc_evaluations += 1;
-        let plane = food.plane(self.reference, self.ray);
-        let PixelView { source, at_infinity } = self.views[view];
-        let source = &self.reference.sources[source];
-        let homography = source.pose.homography(at_infinity, &plane);
-        patch_cost(self.simd, self.window, &self.patch, source.image, &homography)
+        let Evaluator { simd, window, patch, reference, .. } = self;
+        for batch in self.candidates[start..end].chunks_mut(LANES) {
+            let view = |index: usize| {
+                let Candidate { source, centre, .. } = batch[index];
+                let source = &reference.sources[source];
+                (source.image, source.pose.homography_about(centre, plane))
+            };
+            let costs = patch_costs(*simd, window, patch, view, batch.len());
+            for (candidate, cost) in batch.iter_mut().zip(costs) {
+                candidate.least += cost;
+            }
+        }
+        self.counts.ncc_evaluations += (end - start) as u64;
     }
 
     /// Equation 3 of the paper: a small set is penalised.
@@ -216,16 +269,18 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         if count <= 1 {
             return f32::INFINITY;
         }
+        let plane = food.plane(self.reference, self.ray);
         let divisor = (count - 1) as f32;
-        let mut sum: f32 = self.candidates.iter().map(|candidate| candidate.least).sum();
-        for index in 0..count {
-            if sum >= bound * divisor {
+        let sum =
+            |candidates: &[Candidate]| -> f32 { candidates.iter().map(|candidate| candidate.least).sum() };
+        for start in (0..count).step_by(BATCH) {
+            if sum(&self.candidates) >= bound * divisor {
                 self.counts.early_outs += 1;
                 return f32::INFINITY;
             }
-            sum += self.photometric_cost(food, self.candidates[index].view);
+            self.add_photometric_costs(&plane, start, count.min(start + BATCH));
         }
-        sum / divisor
+        sum(&self.candidates) / divisor
     }
 
     /// The mean over the best views of the set; views that cannot see the point do not raise it.
@@ -235,14 +290,16 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         if count < self.rules.min_views {
             return f32::INFINITY;
         }
+        let plane = food.plane(self.reference, self.ray);
         let best = best.min(count);
         let limit = bound * best as f32;
-        for index in 0..count {
-            if sum_of_least(&self.candidates, best) >= limit {
+        for start in (0..count).step_by(BATCH) {
+            // In between, the views not yet looked at are enough to be the best ones.
+            if (start == 0 || start + best > count) && sum_of_least(&self.candidates, best) >= limit {
                 self.counts.early_outs += 1;
                 return f32::INFINITY;
             }
-            self.candidates[index].least += self.photometric_cost(food, self.candidates[index].view);
+            self.add_photometric_costs(&plane, start, count.min(start + BATCH));
         }
         sum_of_least(&self.candidates, best) / best as f32
     }
@@ -251,14 +308,31 @@ impl<'a, S: Simd> Evaluator<'a, S> {
 /// The sum of the `best` smallest costs.
 #[inline(always)]
 fn sum_of_least(candidates: &[Candidate], best: usize) -> f32 {
+    let costs = candidates.iter().map(|candidate| candidate.least);
+    if candidates.len() == best {
+        return costs.sum();
+    }
+    if candidates.len() == best + 1 {
+        let largest = costs.clone().fold(0.0, larger);
+        return costs.sum::<f32>() - largest;
+    }
     let mut least = [f32::INFINITY; MAX_BEST_VIEWS];
-    for candidate in candidates {
-        let mut cost = candidate.least;
+    for mut cost in costs {
         // Without branches: which costs are small cannot be predicted.
-        for place in &mut least[..best] {
-            let (smaller, larger) = (place.min(cost), place.max(cost));
-            (*place, cost) = (smaller, larger);
+        for place in &mut least {
+            (*place, cost) = (smaller(*place, cost), larger(*place, cost));
         }
     }
     least[..best].iter().sum()
+}
+
+/// Costs are numbers: `f32::min` would look for others.
+#[inline(always)]
+fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }

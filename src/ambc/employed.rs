@@ -13,14 +13,10 @@ pub fn send<S: Simd>(evaluator: &mut Evaluator<S>, foods: &mut [FoodSource], ran
         let other = (index + 1 + random.below(foods.len() - 1)) % foods.len();
         let (food, other) = (foods[index], foods[other]);
         let trial = perturb(evaluator, &food, &other, random);
-        if let Some(trial) = trial {
-            let cost = evaluator.cost(&trial, food.cost);
-            if cost < food.cost {
-                foods[index] = FoodSource { cost, ..trial };
-                continue;
-            }
+        let improved = trial.is_some_and(|trial| evaluator.challenge(&mut foods[index], &trial, 0.0));
+        if !improved {
+            foods[index].trials = food.trials.saturating_add(1);
         }
-        foods[index].trials = food.trials.saturating_add(1);
     }
 }
 

@@ -8,6 +8,7 @@ mod onlooker;
 mod random;
 mod schedule;
 mod scout;
+mod smoothness;
 #[cfg(test)]
 mod tests;
 

@@ -2,7 +2,7 @@
 
 use super::colony::Colonies;
 use super::cost::Evaluator;
-use super::food::{FoodSource, cost_to_beat};
+use super::food::FoodSource;
 use super::random::Random;
 use crate::simd::Simd;
 
@@ -46,16 +46,13 @@ pub fn send<S: Simd>(
         let offer = draw_neighbour(neighbours, x, y, random)
             .and_then(|(dx, dy)| brought(evaluator, neighbours, (x, y), (dx, dy)))
             .filter(|offer| !is_same_plane(food, offer));
-        if let Some(offer) = offer {
+        let improved = offer.is_some_and(|offer| {
             let reward = if offer.validated { reward } else { 0.0 };
-            let bound = cost_to_beat(food.cost, reward);
-            let cost = evaluator.cost(&offer, bound);
-            if cost < bound {
-                *food = FoodSource { cost, ..offer };
-                continue;
-            }
+            evaluator.challenge(food, &offer, reward)
+        });
+        if !improved {
+            food.trials = food.trials.saturating_add(1);
         }
-        food.trials = food.trials.saturating_add(1);
     }
 }
 

@@ -1,7 +1,7 @@
 //! The search of one reference view for one cycle: bands of rows on the threads, tiles within a band, and the two
 //! colours of the checkerboard in turn.
 
-use super::colony::{Colonies, Offer, best_first, colour};
+use super::colony::{Colonies, Offer, colour};
 use super::cost::{CostRules, Evaluator};
 use super::food::FoodSource;
 use super::random::{Random, stream};
@@ -99,8 +99,8 @@ impl Task for SearchTask<'_> {
         let mut counts = initialise(simd, search, &mut colonies, &mut sets, &mut focus)?;
         for iteration in 0..search.iterations {
             let [first, second] = &mut colonies;
-            counts += iterate(simd, search, iteration, 0, first, second, &focus)?;
-            counts += iterate(simd, search, iteration, 1, second, first, &focus)?;
+            counts += iterate(simd, search, (iteration, 0), first, second, &focus)?;
+            counts += iterate(simd, search, (iteration, 1), second, first, &focus)?;
         }
         counts.samples = counts.ncc_evaluations * search.window.samples();
         let best = (0..width * height)
@@ -197,13 +197,15 @@ fn fill_colony<S: Simd>(
     let ray = evaluator.ray();
     let strata = colony.len() as f32;
     let mut next = 0;
+    let first = usize::from(start.is_some());
     if let Some(start) = start {
         let food = FoodSource { validated: start.validated, ..FoodSource::new(start.depth, start.normal) };
         focus.copy_from_slice(set);
-        if search.focused_views > 0 {
-            evaluator.focus(&food, search.focused_views, focus);
-        }
-        colony[0] = food;
+        let cost = match search.focused_views {
+            0 => evaluator.cost(&food, f32::INFINITY),
+            count => evaluator.focus(&food, count, focus),
+        };
+        colony[0] = FoodSource { cost, ..food };
         next = 1;
     }
 
@@ -221,21 +223,20 @@ fn fill_colony<S: Simd>(
             FoodSource::random(reference, ray, random, part)
         };
     }
-    for food in colony.iter_mut() {
+    for food in &mut colony[first..] {
         food.cost = evaluator.cost(food, f32::INFINITY);
     }
-    best_first(colony);
+    evaluator.best_first(colony);
 }
 
-/// One iteration over the pixels of one colour.
+/// One iteration over the pixels of one colour; `focus` are the view sets they are matched with.
 fn iterate<S: Simd>(
     simd: S,
     search: &Search,
-    iteration: u32,
-    turn: usize,
+    (iteration, turn): (u32, usize),
     colonies: &mut Colonies,
     neighbours: &Colonies,
-    sets: &ViewSets,
+    focus: &ViewSets,
 ) -> Result<Counts> {
     let (width, height) = (search.width(), search.height());
     let row_foods = colonies.row_len();
@@ -258,12 +259,14 @@ fn iterate<S: Simd>(
                     }
                     let colony = &mut foods[row * row_foods + x / 2 * search.foods..][..search.foods];
                     let mut random = Random::new(stream, pixel as u64);
-                    evaluator.go_to(x, y, sets.words_of(pixel));
+                    evaluator.go_to(x, y, focus.words_of(pixel));
+                    evaluator.look_around(neighbours, (x, y));
+                    evaluator.best_first(colony);
                     employed::send(&mut evaluator, colony, &mut random);
                     onlooker::send(&mut evaluator, colony, neighbours, (x, y), search.reward, &mut random);
-                    best_first(colony);
+                    evaluator.best_first(colony);
                     scout::send(&mut evaluator, colony, search.trial_limit, &mut random);
-                    best_first(colony);
+                    evaluator.best_first(colony);
                 }
                 evaluator.counts
             },

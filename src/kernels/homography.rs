@@ -66,8 +66,14 @@ impl RelativePose {
     /// The homography of a plane about a reference pixel with this [`RelativePose::at_infinity`].
     #[inline(always)]
     pub fn homography(&self, at_infinity: Vec3, plane: &SlantedPlane) -> PatchHomography {
+        self.homography_about(at_infinity + self.epipole * plane.inverse_depth, plane)
+    }
+
+    /// The homography of a plane about a reference pixel that goes to `centre`.
+    #[inline(always)]
+    pub fn homography_about(&self, centre: Vec3, plane: &SlantedPlane) -> PatchHomography {
         PatchHomography {
-            centre: at_infinity + self.epipole * plane.inverse_depth,
+            centre,
             along_x: self.infinite[0] + self.epipole * plane.slope_x,
             along_y: self.infinite[1] + self.epipole * plane.slope_y,
         }

@@ -2,6 +2,7 @@
 
 mod homography;
 mod ncc;
+mod warp;
 
 pub use homography::{PatchHomography, RelativePose, SlantedPlane};
-pub use ncc::{MAX_COST, ReferencePatch, Window, patch_cost};
+pub use ncc::{MAX_COST, ReferencePatch, Window, patch_cost, patch_costs};

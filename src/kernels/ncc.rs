@@ -1,6 +1,7 @@
 //! Bilaterally weighted normalised cross-correlation of a reference patch with its image in a source view.
 
 use super::PatchHomography;
+use super::warp::Warp;
 use crate::image::PackedImage;
 use crate::simd::{LANES, Simd};
 
@@ -39,10 +40,29 @@ impl Window {
     /// A square of half side `radius` sampled every `step` pixels; sigmas in pixels and in intensities of [0, 1],
     /// the smallest variance in intensities of [0, 1] too.
     pub fn new(radius: u32, step: u32, spatial_sigma: f64, colour_sigma: f64, min_variance: f64) -> Window {
+        Window::of((radius, step), |_, _| true, spatial_sigma, colour_sigma, min_variance)
+    }
+
+    /// The samples of the square that lie in the disc of diameter `2 radius + 1`: its corners weigh little and cost as
+    /// much as any sample.
+    pub fn disc(radius: u32, step: u32, spatial_sigma: f64, colour_sigma: f64, min_variance: f64) -> Window {
+        let square = i64::from(2 * radius + 1).pow(2);
+        let is_inside = |x: i32, y: i32| 4 * (i64::from(x).pow(2) + i64::from(y).pow(2)) <= square;
+        Window::of((radius, step), is_inside, spatial_sigma, colour_sigma, min_variance)
+    }
+
+    fn of(
+        (radius, step): (u32, u32),
+        is_inside: impl Fn(i32, i32) -> bool,
+        spatial_sigma: f64,
+        colour_sigma: f64,
+        min_variance: f64,
+    ) -> Window {
         let radius = radius as i32;
         let positions = || (-radius..=radius).step_by(step as usize);
         let samples: Vec<(f32, f32, f32)> = positions()
             .flat_map(|y| positions().map(move |x| (x, y)))
+            .filter(|&(x, y)| is_inside(x, y))
             .map(|(x, y)| {
                 let distance = f64::from(x * x + y * y);
                 (x as f32, y as f32, (-distance / (2.0 * spatial_sigma.powi(2))).exp() as f32)
@@ -71,6 +91,12 @@ impl Window {
             samples: samples.len() as u64,
             min_variance: (min_variance * 255.0 * 255.0) as f32,
         }
+    }
+
+    /// The bilateral weight of a difference of grey values.
+    #[inline(always)]
+    pub fn likeness(&self, a: u8, b: u8) -> f32 {
+        self.colour_weights[usize::from(a.abs_diff(b))]
     }
 
     /// Samples of a patch.
@@ -216,31 +242,60 @@ pub fn patch_cost<S: Simd>(
     if !patch.has_texture(window) {
         return MAX_COST;
     }
-    let (zero, one) = (simd.splat(0.0), simd.splat(1.0));
-    let (right, bottom) = (simd.splat((source.width - 1) as f32), simd.splat((source.height - 1) as f32));
-    let PatchHomography { centre, along_x, along_y } = homography;
-    let (centre_x, centre_y, centre_z) = (simd.splat(centre.x), simd.splat(centre.y), simd.splat(centre.z));
-    let (xx, xy, xz) = (simd.splat(along_x.x), simd.splat(along_x.y), simd.splat(along_x.z));
-    let (yx, yy, yz) = (simd.splat(along_y.x), simd.splat(along_y.y), simd.splat(along_y.z));
+    let [sum, squares, products] =
+        correlate(simd, window, patch, source, homography).map(|sum| simd.sum(sum));
+    let variance = squares - sum * sum;
+    // Written so that a variance that is not a number has no texture.
+    if variance >= window.min_variance {
+        (1.0 - products / variance.sqrt()).clamp(0.0, MAX_COST)
+    } else {
+        MAX_COST
+    }
+}
+
+/// The [`patch_cost`] in the first `count` source views, at most eight, to the bit; [`MAX_COST`] in the other lanes.
+/// What is left to do after the samples is shared by all views.
+#[inline(always)]
+pub fn patch_costs<'a, S: Simd>(
+    simd: S,
+    window: &Window,
+    patch: &ReferencePatch,
+    mut view: impl FnMut(usize) -> (&'a PackedImage, PatchHomography),
+    count: usize,
+) -> [f32; LANES] {
+    let zero = simd.splat(0.0);
+    let (mut sums, mut squares, mut products) = ([zero; LANES], [zero; LANES], [zero; LANES]);
+    for index in 0..count.min(LANES) {
+        let (source, homography) = view(index);
+        [sums[index], squares[index], products[index]] = correlate(simd, window, patch, source, &homography);
+    }
+    let (sum, squares, products) = (simd.sums(&sums), simd.sums(&squares), simd.sums(&products));
+    let variance = simd.sub(squares, simd.mul(sum, sum));
+    let least = if patch.has_texture(window) { window.min_variance } else { f32::INFINITY };
+    let has_texture = simd.at_least(variance, simd.splat(least));
+    let ncc = simd.div(products, simd.sqrt(variance));
+    let cost = simd.min(simd.max(simd.sub(simd.splat(1.0), ncc), zero), simd.splat(MAX_COST));
+    let cost = simd.store(cost);
+    std::array::from_fn(|lane| if has_texture >> lane & 1 != 0 { cost[lane] } else { MAX_COST })
+}
+
+/// The weighted sums over a patch's image in a source view, eight samples a vector: of the differences to the
+/// reference's mean, of their squares, and of their products with the reference.
+#[inline(always)]
+fn correlate<S: Simd>(
+    simd: S,
+    window: &Window,
+    patch: &ReferencePatch,
+    source: &PackedImage,
+    homography: &PatchHomography,
+) -> [S::F32; 3] {
+    let zero = simd.splat(0.0);
+    let warp = Warp::new(simd, source, homography);
     let mean = simd.splat(patch.mean);
     let (mut sum, mut squares, mut products) = (zero, zero, zero);
     for (offsets, (weight, weighted)) in window.offsets.iter().zip(patch.weights.iter().zip(&patch.weighted))
     {
-        let (dx, dy) = (simd.load(&offsets.x), simd.load(&offsets.y));
-        let z = simd.mul_add(dy, yz, simd.mul_add(dx, xz, centre_z));
-        let inverse_z = simd.div(one, z);
-        let x = simd.mul(simd.mul_add(dy, yx, simd.mul_add(dx, xx, centre_x)), inverse_z);
-        let y = simd.mul(simd.mul_add(dy, yy, simd.mul_add(dx, xy, centre_y)), inverse_z);
-        // max gives 0 for what is not a number: samples on the source camera's plane.
-        let x = simd.min(simd.max(x, zero), right);
-        let y = simd.min(simd.max(y, zero), bottom);
-        let (column, row) = (simd.whole(x), simd.whole(y));
-        let (fraction_x, fraction_y) = (simd.sub(x, column), simd.sub(y, row));
-        let [top_left, bottom_left, top_right, bottom_right] =
-            simd.gather_bytes(&source.pairs, source.stride(), column, row);
-        let top = simd.mul_add(fraction_x, simd.sub(top_right, top_left), top_left);
-        let low = simd.mul_add(fraction_x, simd.sub(bottom_right, bottom_left), bottom_left);
-        let grey = simd.mul_add(fraction_y, simd.sub(low, top), top);
+        let grey = warp.sample(simd, source, simd.load(&offsets.x), simd.load(&offsets.y));
         // About the reference's mean: single-pass sums in f32 lose digits in low contrast.
         let difference = simd.sub(grey, mean);
         let share = simd.mul(simd.load(weight), difference);
@@ -248,12 +303,5 @@ pub fn patch_cost<S: Simd>(
         squares = simd.mul_add(share, difference, squares);
         products = simd.mul_add(simd.load(weighted), difference, products);
     }
-    let mean = simd.sum(sum);
-    let variance = simd.sum(squares) - mean * mean;
-    // Written so that a variance that is not a number has no texture.
-    if variance >= window.min_variance {
-        (1.0 - simd.sum(products) / variance.sqrt()).clamp(0.0, MAX_COST)
-    } else {
-        MAX_COST
-    }
+    [sum, squares, products]
 }

@@ -57,6 +57,11 @@ impl Simd for Base {
     }
 
     #[inline(always)]
+    fn at_least(self, a: f32x8, b: f32x8) -> u8 {
+        a.simd_ge(b).to_bitmask() as u8
+    }
+
+    #[inline(always)]
     fn whole(self, a: f32x8) -> f32x8 {
         a.trunc()
     }
@@ -75,6 +80,11 @@ impl Simd for Base {
     #[inline(always)]
     fn sum(self, a: f32x8) -> f32 {
         Scalar.sum(a.to_array())
+    }
+
+    #[inline(always)]
+    fn sqrt(self, a: f32x8) -> f32x8 {
+        a.sqrt()
     }
 
     #[inline(always)]

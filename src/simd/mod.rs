@@ -44,6 +44,8 @@ pub trait Simd: Copy + Send + Sync {
     fn max(self, a: Self::F32, b: Self::F32) -> Self::F32;
     /// `a < b ? a : b`, so `b` where a lane is not a number.
     fn min(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// `a >= b` as bits, the first lane in the lowest; not where a lane is not a number.
+    fn at_least(self, a: Self::F32, b: Self::F32) -> u8;
     /// The whole part of lanes in [0, 2^24).
     fn whole(self, a: Self::F32) -> Self::F32;
     /// The four bytes, lowest first, of the pairs at `y * stride + x` and after it, for whole, non-negative `x` and `y`.
@@ -53,6 +55,13 @@ pub trait Simd: Copy + Send + Sync {
     fn look_up(self, table: &[f32; 256], a: Self::F32) -> Self::F32;
     /// The sum of the lanes, as `((l0 + l4) + (l2 + l6)) + ((l1 + l5) + (l3 + l7))`.
     fn sum(self, a: Self::F32) -> f32;
+    /// The square root.
+    fn sqrt(self, a: Self::F32) -> Self::F32;
+    /// The sums of eight vectors, as [`Simd::sum`] adds them, one a lane.
+    #[inline(always)]
+    fn sums(self, vectors: &[Self::F32; LANES]) -> Self::F32 {
+        self.load(&vectors.map(|vector| self.sum(vector)))
+    }
     /// Runs `f` compiled for this instruction set. Only what is inlined into `f` profits.
     fn vectorize<R>(self, f: impl FnOnce() -> R) -> R;
 

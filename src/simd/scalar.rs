@@ -57,6 +57,11 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
+    fn at_least(self, a: Self::F32, b: Self::F32) -> u8 {
+        (0..LANES).fold(0, |bits, lane| bits | u8::from(a[lane] >= b[lane]) << lane)
+    }
+
+    #[inline(always)]
     fn whole(self, a: Self::F32) -> Self::F32 {
         from_fn(|lane| a[lane] as i32 as f32)
     }
@@ -79,6 +84,11 @@ impl Simd for Scalar {
     #[inline(always)]
     fn sum(self, l: Self::F32) -> f32 {
         ((l[0] + l[4]) + (l[2] + l[6])) + ((l[1] + l[5]) + (l[3] + l[7]))
+    }
+
+    #[inline(always)]
+    fn sqrt(self, a: Self::F32) -> Self::F32 {
+        a.map(f32::sqrt)
     }
 
     #[inline(always)]

@@ -79,6 +79,12 @@ impl Simd for X86V3 {
     }
 
     #[inline(always)]
+    fn at_least(self, a: __m256, b: __m256) -> u8 {
+        // SAFETY: AVX is there.
+        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(a, b)) as u8 }
+    }
+
+    #[inline(always)]
     fn whole(self, a: __m256) -> __m256 {
         // SAFETY: AVX is there.
         unsafe { _mm256_round_ps::<{ _MM_FROUND_TO_ZERO | _MM_FROUND_NO_EXC }>(a) }
@@ -125,6 +131,36 @@ impl Simd for X86V3 {
             let four = _mm_add_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps::<1>(a));
             let two = _mm_add_ps(four, _mm_movehl_ps(four, four));
             _mm_cvtss_f32(_mm_add_ss(two, _mm_shuffle_ps::<1>(two, two)))
+        }
+    }
+
+    #[inline(always)]
+    fn sqrt(self, a: __m256) -> __m256 {
+        // SAFETY: AVX is there.
+        unsafe { _mm256_sqrt_ps(a) }
+    }
+
+    // Each step adds as `sum` does, for twice as many vectors at once.
+    #[inline(always)]
+    fn sums(self, vectors: &[__m256; LANES]) -> __m256 {
+        let [a, b, c, d, e, f, g, h] = *vectors;
+        // SAFETY: AVX2 is there.
+        unsafe {
+            let four = |a, b| {
+                _mm256_add_ps(_mm256_permute2f128_ps::<0x20>(a, b), _mm256_permute2f128_ps::<0x31>(a, b))
+            };
+            let two = |a, b| {
+                let (a, b) = (_mm256_castps_pd(a), _mm256_castps_pd(b));
+                let (low, high) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
+                _mm256_add_ps(_mm256_castpd_ps(low), _mm256_castpd_ps(high))
+            };
+            let (abcd, efgh) = (two(four(a, b), four(c, d)), two(four(e, f), four(g, h)));
+            let (even, odd) = (
+                _mm256_shuffle_ps::<0b10_00_10_00>(abcd, efgh),
+                _mm256_shuffle_ps::<0b11_01_11_01>(abcd, efgh),
+            );
+            // The sums of a, c, e, g, b, d, f, h.
+            _mm256_permutevar8x32_ps(_mm256_add_ps(even, odd), _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7))
         }
     }
 

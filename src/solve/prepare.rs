@@ -47,7 +47,8 @@ impl Steps {
     /// [`Steps::new`] that can be cancelled.
     pub(super) fn new_with(scene: &Scene, options: &Options, cancelled: Cancelled) -> Result<Steps> {
         options.check()?;
-        let window = Window::new(
+        let make_window = if options.round_window { Window::disc } else { Window::new };
+        let window = make_window(
             options.window_radius,
             options.window_step,
             options.spatial_sigma,

@@ -2,11 +2,13 @@
 //! views; incidence and visibility then refine the set of each pixel.
 
 mod angle;
+mod placement;
 mod reference;
 mod select;
 mod set;
 
 pub use angle::{SourceLists, source_lists, triangulation_angle};
+pub use placement::{Placement, Placements};
 pub use reference::{Reference, Source};
 pub use select::{ViewRules, faces_source, is_occluded};
 pub use set::ViewSets;

@@ -147,10 +147,14 @@ fn help_names_files_and_ways_out() {
 fn wrong_arguments_end_with_status_2_and_say_what_would_be_right() {
     let scene = board();
     let scene = scene.to_str().unwrap();
-    let cases: [(&[&str], &str); 8] = [
+    let cases: [(&[&str], &str); 12] = [
         (&[], "Usage:"),
         (&["reconstruct"], "<SCENE>"),
-        (&["reconstruct", scene, "--preset", "fast"], "default, paper"),
+        (&["reconstruct", scene, "--preset", "quick"], "default, fast, paper"),
+        (&["reconstruct", scene, "--set", "reward"], "NAME=VALUE"),
+        (&["reconstruct", scene, "--set", "reward=much"], "is not a number"),
+        (&["reconstruct", scene, "--scale", "3:4:6+3x1"], "2:4:6+3x1"),
+        (&["reconstruct", scene, "--scale", "2:4:6"], "2:4:6+3x1"),
         (&["reconstruct", scene, "--without", "rewards"], "view-selection, reward, propagation"),
         (
             &["reconstruct", scene, "--depth-range", "2", "1"],
@@ -217,6 +221,12 @@ fn parts_of_the_method_can_be_left_out_quietly() {
         "7",
         "--without",
         "view-selection,reward,propagation",
+        "--set",
+        "spatial_sigma=2.5",
+        "--scale",
+        "2:3:2+1x1",
+        "--scale",
+        "1:2:1+0x1",
     ]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     assert!(output.stdout.is_empty(), "{}", text(&output.stdout));
@@ -229,6 +239,8 @@ fn parts_of_the_method_can_be_left_out_quietly() {
     let option = |name: &str| report["options"][name].as_str().unwrap();
     assert_eq!([option("view_selection"), option("reward"), option("propagation")], ["0", "0", "0"]);
     assert_eq!((option("seed"), &report["threads"]), ("7", &2.into()));
+    assert_eq!(option("spatial_sigma"), "2.5");
+    assert_eq!(option("scales"), "1/2: 3 foods, 2 + 1x1 iterations; 1/1: 2 foods, 1 + 0x1 iterations");
 }
 
 /// README's first command, on a copy: every promised file with its layout, the report, then the cloud again from the

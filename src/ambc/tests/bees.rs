@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::ambc::MIN_FACING;
-use crate::ambc::colony::{Colonies, best_first, colour};
+use crate::ambc::colony::{Colonies, colour};
 use crate::ambc::food::cost_to_beat;
 use crate::ambc::random::Random;
 use crate::ambc::{employed, onlooker, scout};
@@ -178,9 +178,58 @@ fn a_scout_replaces_the_stalest_beyond_the_limit_and_never_the_best() {
 fn the_best_stands_first_with_its_trials_and_of_equals_the_earlier() {
     let food = |cost, trials| FoodSource { cost, trials, ..FoodSource::new(1.0, Vec3::NEG_Z) };
     let mut foods = [food(0.5, 1), food(0.2, 2), food(0.2, 3)];
-    best_first(&mut foods);
+    let (world, window) = (World::five(), window());
+    let reference = world.reference();
+    let evaluator = standing(&reference, &window, &options(), false);
+    evaluator.best_first(&mut foods);
     assert_eq!(foods, [food(0.2, 2), food(0.5, 1), food(0.2, 3)]);
     let mut unevaluated = [food(f32::INFINITY, 1), food(f32::INFINITY, 2)];
-    best_first(&mut unevaluated);
+    evaluator.best_first(&mut unevaluated);
     assert_eq!(unevaluated[0].trials, 1);
+}
+
+// The neighbours' say.
+
+#[test]
+fn a_plane_that_continues_the_validated_neighbours_is_preferred_and_others_pay_up_to_a_limit() {
+    let (world, window) = (World::five(), window());
+    let reference = world.reference();
+    let smooth = Options {
+        smoothness: 0.2,
+        smoothness_depth: 0.01,
+        smoothness_normal: 40.0,
+        colour_sigma: 1e3,
+        ..options()
+    };
+    let food = |cost, factor| FoodSource { cost, ..wall(&world, PIXEL, factor) };
+    // The dearer plane stands first exactly if what it saves in smoothness is more.
+    let prefers_wall = |validated, factor, extra: f32| {
+        let mut evaluator = standing(&reference, &window, &smooth, false);
+        evaluator.look_around(&neighbours(&world, 1.0, validated), PIXEL);
+        let mut foods = [food(0.1, factor), food(0.1 + extra, 1.0)];
+        evaluator.best_first(&mut foods);
+        foods[0] == food(0.1 + extra, 1.0)
+    };
+    assert!(!prefers_wall(false, 1.05, 0.001), "neighbours that are not validated have no say");
+    assert!(prefers_wall(true, 1.005, 0.05) && !prefers_wall(true, 1.005, 0.15), "half of the limit");
+    assert!(prefers_wall(true, 1.05, 0.15) && !prefers_wall(true, 1.05, 0.25), "the limit");
+    assert!(prefers_wall(true, 1.5, 0.15) && !prefers_wall(true, 1.5, 0.25), "no more than the limit");
+}
+
+#[test]
+fn neighbours_of_another_grey_have_no_say() {
+    let mut world = World::five();
+    let grey = |x: usize, y: usize| if (x, y) == PIXEL { 255 } else { 90 };
+    let (width, height) = (world.images[0].width, world.images[0].height);
+    let greys = (0..width * height).map(|pixel| grey(pixel % width, pixel / width)).collect();
+    let picture = crate::image::Picture::from_grey(width as u32, height as u32, greys).unwrap();
+    world.images[0] = crate::image::PackedImage::new(&picture);
+    let (reference, window) = (world.reference(), window());
+    let smooth = Options { smoothness: 0.2, ..options() };
+    let mut evaluator = standing(&reference, &window, &smooth, false);
+    evaluator.look_around(&neighbours(&world, 1.0, true), PIXEL);
+    let food = |cost, factor| FoodSource { cost, ..wall(&world, PIXEL, factor) };
+    let mut foods = [food(0.1, 1.05), food(0.12, 1.0)];
+    evaluator.best_first(&mut foods);
+    assert_eq!(foods[0], food(0.1, 1.05));
 }

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::ambc::food::fitness;
+use crate::image::{PackedImage, Picture};
 use crate::testing::window;
 
 #[test]
@@ -125,4 +126,33 @@ fn disagreeing_with_validated_depths_costs_up_to_a_limit() {
 #[test]
 fn fitness_falls_as_the_cost_grows() {
     assert_eq!([0.0, 1.0, f32::INFINITY].map(fitness), [1.0, 0.5, 0.0]);
+}
+
+#[test]
+fn a_pixel_focuses_on_the_views_whose_surfaces_agree_and_without_them_on_those_that_match_best() {
+    let (mut world, window) = (World::five(), window());
+    let food = wall(&world, PIXEL, 1.0);
+    let focused = |world: &World, geometric, food: &FoodSource| {
+        let reference = world.reference();
+        let mut evaluator = standing(&reference, &window, &options(), geometric);
+        let mut set = [0b1111];
+        let cost = evaluator.focus(food, 3, &mut set);
+        assert_eq!(set[0].count_ones(), 3);
+        assert_eq!(cost, evaluator.cost(food, f32::INFINITY), "the cost in the views kept");
+        (set[0], evaluator.counts.ncc_evaluations)
+    };
+    // One image shows something else.
+    world.images[2] = PackedImage::new(&Picture::from_grey(36, 28, vec![7; 36 * 28]).unwrap());
+    assert_eq!(focused(&world, false, &food), (0b1101, 4 + 3));
+    // One surface lies elsewhere: it is known without looking at any image.
+    for view in 1..5 {
+        let mut state = testing::exact(&world.cameras[view]);
+        if view == 4 {
+            state.solutions.iter_mut().for_each(|solution| solution.depth *= 1.1);
+        }
+        let validated = vec![(4, true); state.solutions.len()];
+        state.mark(&world.cameras[view], &validated);
+        world.surfaces[view] = state.surface;
+    }
+    assert_eq!(focused(&world, true, &food), (0b0111, 3 + 3));
 }

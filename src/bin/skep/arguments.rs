@@ -1,7 +1,7 @@
 //! The words of the command line and the help that teaches them.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use skep::{DepthRange, Options, Result};
+use skep::{DepthRange, Options, Result, Scale};
 use std::path::PathBuf;
 
 #[derive(Parser)]
@@ -30,7 +30,8 @@ pub struct Reconstruct {
     /// Where the results go [default: SCENE/dense]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// default measures best; paper follows the paper to the letter and takes its time
+    /// default measures best; fast takes less than half of its time; paper follows the paper to the letter and takes
+    /// its own
     #[arg(long, default_value = "default", value_parser = Options::PRESETS)]
     pub preset: String,
     /// Worker threads; 0 takes one for each core. The result does not depend on it
@@ -45,9 +46,45 @@ pub struct Reconstruct {
     /// Leave parts of the method out, separated by commas
     #[arg(long, value_name = "PARTS", value_delimiter = ',')]
     without: Vec<Part>,
+    /// Set an option of the preset; `skep info` lists names and values. May be repeated
+    #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
+    set: Vec<(String, f64)>,
+    /// Scales to search instead of the preset's, coarsest first, the last at full size: 2:4:6+3x1 is half size with
+    /// 4 food sources a pixel, 6 iterations in the first cycle and 3 more cycles of 1. May be repeated
+    #[arg(long, value_name = "SCALE", value_parser = scale)]
+    scale: Vec<Scale>,
     /// Print warnings and errors only
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// `NAME=VALUE`.
+fn setting(text: &str) -> std::result::Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE, such as reward=0.1")?;
+    let value = value.trim().parse().map_err(|_| format!("{value:?} is not a number"))?;
+    Ok((name.trim().to_owned(), value))
+}
+
+/// `REDUCTION:FOODS:FIRST+CYCLESxITERATIONS`.
+fn scale(text: &str) -> std::result::Result<Scale, String> {
+    let parsed = || {
+        let mut parts = text.split([':', '+', 'x']).map(|part| part.parse::<u32>().ok());
+        let mut next = || parts.next().flatten();
+        let [reduction, foods, first_iterations, cycles, cycle_iterations] =
+            [next()?, next()?, next()?, next()?, next()?];
+        let halvings = reduction.is_power_of_two().then(|| reduction.trailing_zeros())?;
+        parts.next().is_none().then_some(Scale {
+            halvings,
+            foods,
+            first_iterations,
+            cycles,
+            cycle_iterations,
+        })
+    };
+    parsed().ok_or_else(|| {
+        "expected REDUCTION:FOODS:FIRST+CYCLESxITERATIONS with a power of two first, such as 2:4:6+3x1"
+            .to_owned()
+    })
 }
 
 /// A part of the method that can be left out.
@@ -93,6 +130,12 @@ impl Reconstruct {
                 Part::Reward => options.reward = 0.0,
                 Part::Propagation => options.propagation = false,
             }
+        }
+        for (name, value) in &self.set {
+            options.set(name, *value)?;
+        }
+        if !self.scale.is_empty() {
+            options.scales.clone_from(&self.scale);
         }
         Ok(options)
     }

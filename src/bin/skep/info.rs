@@ -19,25 +19,27 @@ pub fn cores() -> usize {
 
 /// A row for each option, a column for each preset.
 fn preset_table() -> Vec<String> {
-    let [first, second] = Options::PRESETS;
-    let values = Options::default().entries().into_iter().zip(Options::paper().entries());
-    let rows = values.flat_map(|((name, left), (_, right))| row(name, &left, &right));
-    row("option", first, second).into_iter().chain(rows).collect()
+    let presets: Vec<Vec<(&str, String)>> = (Options::PRESETS.iter())
+        .map(|name| Options::preset(name).expect("presets are found by their names").entries())
+        .collect();
+    let mut lines = row("option", &Options::PRESETS);
+    for (place, (name, _)) in presets[0].iter().enumerate() {
+        let values: Vec<&str> = presets.iter().map(|entries| entries[place].1.as_str()).collect();
+        lines.extend(row(name, &values));
+    }
+    lines
 }
 
 /// The lines of one row: a value of several parts takes a line for each.
-fn row(name: &str, left: &str, right: &str) -> Vec<String> {
-    let (mut left, mut right) = (left.split("; "), right.split("; "));
-    let mut lines = Vec::new();
-    let mut name = name;
-    loop {
-        match (left.next(), right.next()) {
-            (None, None) => return lines,
-            (left, right) => {
-                let line = format!("{name:<24}{:<34}{}", left.unwrap_or(""), right.unwrap_or(""));
-                lines.push(line.trim_end().to_owned());
-                name = "";
-            }
+fn row(name: &str, values: &[&str]) -> Vec<String> {
+    let parts: Vec<Vec<&str>> = values.iter().map(|value| value.split("; ").collect()).collect();
+    let count = parts.iter().map(Vec::len).max().unwrap_or(0);
+    let line = |index: usize| {
+        let mut line = format!("{:<24}", if index == 0 { name } else { "" });
+        for parts in &parts {
+            line += &format!("{:<34}", parts.get(index).unwrap_or(&""));
         }
-    }
+        line.trim_end().to_owned()
+    };
+    (0..count).map(line).collect()
 }
