@@ -233,11 +233,15 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     fn find_candidates(&mut self, food: &FoodSource) {
         let Evaluator { placements, candidates, reference, rules, .. } = self;
         candidates.clear();
-        placements.find(food.depth, |at| {
-            let depth = at.centre.z * food.depth;
-            let least = rules.geometric_cost(&reference.sources[at.source], at.x, at.y, depth);
-            candidates.push(Candidate { source: at.source, centre: at.centre, least });
-        });
+        placements.find(
+            food.depth,
+            #[inline(always)]
+            |at| {
+                let depth = at.centre.z * food.depth;
+                let least = rules.geometric_cost(&reference.sources[at.source], at.x, at.y, depth);
+                candidates.push(Candidate { source: at.source, centre: at.centre, least });
+            },
+        );
     }
 
     /// Adds what the hypothesis costs in these candidates by their images.
@@ -249,12 +253,19 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         }
         let Evaluator { simd, window, patch, reference, .. } = self;
         for batch in self.candidates[start..end].chunks_mut(LANES) {
-            let view = |index: usize| {
-                let Candidate { source, centre, .. } = batch[index];
-                let source = &reference.sources[source];
-                (source.image, source.pose.homography_about(centre, plane))
-            };
-            let costs = patch_costs(*simd, window, patch, view, batch.len());
+            let candidates: &[Candidate] = batch;
+            let costs = patch_costs(
+                *simd,
+                window,
+                patch,
+                #[inline(always)]
+                |index| {
+                    let Candidate { source, centre, .. } = candidates[index];
+                    let source = &reference.sources[source];
+                    (source.image, source.pose.homography_about(centre, plane))
+                },
+                batch.len(),
+            );
             for (candidate, cost) in batch.iter_mut().zip(costs) {
                 candidate.least += cost;
             }

@@ -242,8 +242,8 @@ pub fn patch_cost<S: Simd>(
     if !patch.has_texture(window) {
         return MAX_COST;
     }
-    let [sum, squares, products] =
-        correlate(simd, window, patch, source, homography).map(|sum| simd.sum(sum));
+    let [sum, squares, products] = correlate(simd, window, patch, source, homography);
+    let (sum, squares, products) = (simd.sum(sum), simd.sum(squares), simd.sum(products));
     let variance = squares - sum * sum;
     // Written so that a variance that is not a number has no texture.
     if variance >= window.min_variance {

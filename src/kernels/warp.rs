@@ -3,6 +3,7 @@
 use super::PatchHomography;
 use crate::image::PackedImage;
 use crate::simd::Simd;
+use glam::Vec3;
 
 /// A homography and the source's border, in all lanes.
 #[derive(Clone, Copy)]
@@ -17,11 +18,10 @@ pub(super) struct Warp<S: Simd> {
 impl<S: Simd> Warp<S> {
     #[inline(always)]
     pub fn new(simd: S, source: &PackedImage, homography: &PatchHomography) -> Warp<S> {
-        let splat = |vector: glam::Vec3| [simd.splat(vector.x), simd.splat(vector.y), simd.splat(vector.z)];
         Warp {
-            centre: splat(homography.centre),
-            along_x: splat(homography.along_x),
-            along_y: splat(homography.along_y),
+            centre: splat(simd, homography.centre),
+            along_x: splat(simd, homography.along_x),
+            along_y: splat(simd, homography.along_y),
             right: simd.splat((source.width - 1) as f32),
             bottom: simd.splat((source.height - 1) as f32),
         }
@@ -31,14 +31,10 @@ impl<S: Simd> Warp<S> {
     #[inline(always)]
     pub fn sample(&self, simd: S, source: &PackedImage, dx: S::F32, dy: S::F32) -> S::F32 {
         let zero = simd.splat(0.0);
-        let at = |axis: usize| {
-            let across = simd.mul_add(dx, self.along_x[axis], self.centre[axis]);
-            simd.mul_add(dy, self.along_y[axis], across)
-        };
-        let inverse_z = simd.div(simd.splat(1.0), at(2));
+        let inverse_z = simd.div(simd.splat(1.0), self.at(simd, 2, dx, dy));
         // max gives 0 for what is not a number: samples on the source camera's plane.
-        let x = simd.min(simd.max(simd.mul(at(0), inverse_z), zero), self.right);
-        let y = simd.min(simd.max(simd.mul(at(1), inverse_z), zero), self.bottom);
+        let x = simd.min(simd.max(simd.mul(self.at(simd, 0, dx, dy), inverse_z), zero), self.right);
+        let y = simd.min(simd.max(simd.mul(self.at(simd, 1, dx, dy), inverse_z), zero), self.bottom);
         let (column, row) = (simd.whole(x), simd.whole(y));
         let (fraction_x, fraction_y) = (simd.sub(x, column), simd.sub(y, row));
         let [top_left, bottom_left, top_right, bottom_right] =
@@ -47,4 +43,15 @@ impl<S: Simd> Warp<S> {
         let low = simd.mul_add(fraction_x, simd.sub(bottom_right, bottom_left), bottom_left);
         simd.mul_add(fraction_y, simd.sub(low, top), top)
     }
+    /// A homogeneous coordinate of the samples.
+    #[inline(always)]
+    fn at(&self, simd: S, axis: usize, dx: S::F32, dy: S::F32) -> S::F32 {
+        let across = simd.mul_add(dx, self.along_x[axis], self.centre[axis]);
+        simd.mul_add(dy, self.along_y[axis], across)
+    }
+}
+
+#[inline(always)]
+fn splat<S: Simd>(simd: S, vector: Vec3) -> [S::F32; 3] {
+    [simd.splat(vector.x), simd.splat(vector.y), simd.splat(vector.z)]
 }

@@ -15,6 +15,26 @@ impl X86V3 {
     }
 }
 
+impl X86V3 {
+    /// `l0 + l4, l1 + l5, l2 + l6, l3 + l7` of `a`, then of `b`.
+    #[inline(always)]
+    fn add_halves(self, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: AVX is there: `self` exists.
+        unsafe { _mm256_add_ps(_mm256_permute2f128_ps::<0x20>(a, b), _mm256_permute2f128_ps::<0x31>(a, b)) }
+    }
+
+    /// `l0 + l2, l1 + l3` of each half: of `a`, then of `b`.
+    #[inline(always)]
+    fn add_pairs(self, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: AVX is there: `self` exists.
+        unsafe {
+            let (a, b) = (_mm256_castps_pd(a), _mm256_castps_pd(b));
+            let (low, high) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
+            _mm256_add_ps(_mm256_castpd_ps(low), _mm256_castpd_ps(high))
+        }
+    }
+}
+
 // Every `unsafe` block below calls AVX or AVX2 intrinsics, whose only demand is that the machine has them.
 // SAFETY (all of them): `self` exists, so `X86V3::new` has seen AVX2. What else a block needs is said there.
 impl Simd for X86V3 {
@@ -144,21 +164,13 @@ impl Simd for X86V3 {
     #[inline(always)]
     fn sums(self, vectors: &[__m256; LANES]) -> __m256 {
         let [a, b, c, d, e, f, g, h] = *vectors;
+        let (ab, cd) = (self.add_halves(a, b), self.add_halves(c, d));
+        let (ef, gh) = (self.add_halves(e, f), self.add_halves(g, h));
+        let (abcd, efgh) = (self.add_pairs(ab, cd), self.add_pairs(ef, gh));
         // SAFETY: AVX2 is there.
         unsafe {
-            let four = |a, b| {
-                _mm256_add_ps(_mm256_permute2f128_ps::<0x20>(a, b), _mm256_permute2f128_ps::<0x31>(a, b))
-            };
-            let two = |a, b| {
-                let (a, b) = (_mm256_castps_pd(a), _mm256_castps_pd(b));
-                let (low, high) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b));
-                _mm256_add_ps(_mm256_castpd_ps(low), _mm256_castpd_ps(high))
-            };
-            let (abcd, efgh) = (two(four(a, b), four(c, d)), two(four(e, f), four(g, h)));
-            let (even, odd) = (
-                _mm256_shuffle_ps::<0b10_00_10_00>(abcd, efgh),
-                _mm256_shuffle_ps::<0b11_01_11_01>(abcd, efgh),
-            );
+            let even = _mm256_shuffle_ps::<0b10_00_10_00>(abcd, efgh);
+            let odd = _mm256_shuffle_ps::<0b11_01_11_01>(abcd, efgh);
             // The sums of a, c, e, g, b, d, f, h.
             _mm256_permutevar8x32_ps(_mm256_add_ps(even, odd), _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7))
         }

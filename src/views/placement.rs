@@ -98,11 +98,11 @@ impl<S: Simd> Placements<S> {
             if group.wanted == 0 {
                 continue;
             }
-            let [x, y, z] = std::array::from_fn(|axis| {
-                let (epipole, origin) =
-                    (simd.load(&group.epipole[axis]), simd.load(&group.at_infinity[axis]));
-                simd.mul_add(epipole, inverse_depth, origin)
-            });
+            let (x, y, z) = (
+                group.coordinate(simd, 0, inverse_depth),
+                group.coordinate(simd, 1, inverse_depth),
+                group.coordinate(simd, 2, inverse_depth),
+            );
             let inverse_z = simd.div(simd.splat(1.0), z);
             let (column, row) = (simd.mul(x, inverse_z), simd.mul(y, inverse_z));
             let [right, bottom] = [simd.load(&group.corner[0]), simd.load(&group.corner[1])];
@@ -123,6 +123,16 @@ impl<S: Simd> Placements<S> {
                 });
             }
         }
+    }
+}
+
+impl Group {
+    /// A homogeneous coordinate of the pixel's point at an inverse depth. A function, no closure: what is not inlined is
+    /// not compiled for the instruction set.
+    #[inline(always)]
+    fn coordinate<S: Simd>(&self, simd: S, axis: usize, inverse_depth: S::F32) -> S::F32 {
+        let (epipole, origin) = (simd.load(&self.epipole[axis]), simd.load(&self.at_infinity[axis]));
+        simd.mul_add(epipole, inverse_depth, origin)
     }
 }
 
