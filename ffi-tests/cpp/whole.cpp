@@ -63,7 +63,7 @@ void test_options() {
 
     FAILS(SKEP_ERR_ARGUMENT, "thread", options.set("thread", 1));
     FAILS(SKEP_ERR_ARGUMENT, "stop_share", options.set("stop_share", 2));
-    FAILS(SKEP_ERR_ARGUMENT, "fast", skep::Options::create("fast"));
+    FAILS(SKEP_ERR_ARGUMENT, "quick", skep::Options::create("quick"));
     CHECK(MUST(options.get("threads")) == 2);
 }
 
