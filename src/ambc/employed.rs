@@ -13,7 +13,11 @@ pub fn send<S: Simd>(evaluator: &mut Evaluator<S>, foods: &mut [FoodSource], ran
         let other = (index + 1 + random.below(foods.len() - 1)) % foods.len();
         let (food, other) = (foods[index], foods[other]);
         let trial = perturb(evaluator, &food, &other, random);
-        let improved = trial.is_some_and(|trial| evaluator.challenge(&mut foods[index], &trial, 0.0));
+        // No closure around what evaluates: left on its own it would not be compiled for the instruction set.
+        let improved = match trial {
+            Some(trial) => evaluator.challenge(&mut foods[index], &trial, 0.0),
+            None => false,
+        };
         if !improved {
             foods[index].trials = food.trials.saturating_add(1);
         }

@@ -46,10 +46,10 @@ pub fn send<S: Simd>(
         let offer = draw_neighbour(neighbours, x, y, random)
             .and_then(|(dx, dy)| brought(evaluator, neighbours, (x, y), (dx, dy)))
             .filter(|offer| !is_same_plane(food, offer));
-        let improved = offer.is_some_and(|offer| {
-            let reward = if offer.validated { reward } else { 0.0 };
-            evaluator.challenge(food, &offer, reward)
-        });
+        let improved = match offer {
+            Some(offer) => evaluator.challenge(food, &offer, if offer.validated { reward } else { 0.0 }),
+            None => false,
+        };
         if !improved {
             food.trials = food.trials.saturating_add(1);
         }
