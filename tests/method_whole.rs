@@ -163,7 +163,7 @@ fn is_inside_panel(made: &Procedural, view: usize, pixel: usize, margin: usize) 
 }
 
 #[test]
-fn a_panel_without_texture_is_recovered_with_the_reward_and_not_without() {
+fn a_panel_without_texture_is_recovered_with_the_reward_or_smoothness_and_not_without_both() {
     let made = procedural::textureless_panel().only(&[1, 3, 4, 5, 7]);
     // Nothing else may carry planes inwards: neither coarser scales, where the panel is small, nor other views.
     let scale = Scale { halvings: 0, foods: 3, first_iterations: 6, cycles: 16, cycle_iterations: 1 };
@@ -181,12 +181,16 @@ fn a_panel_without_texture_is_recovered_with_the_reward_and_not_without() {
             pixels.map(|pixel| is_inside_panel(&made, view, pixel, margin)).collect()
         })
         .collect();
-    let recovered = |reward: f64| {
-        let result = run(&made, &Options { reward, ..alone.clone() });
+    let recovered = |reward: f64, smoothness: f64| {
+        let result = run(&made, &Options { reward, smoothness, ..alone.clone() });
         share_right_of_estimates(&made, &result, |view, pixel| inside[view][pixel])
     };
-    let (with, without) = (recovered(options().reward), recovered(0.0));
-    assert!(with > 0.5 && without < 0.1, "{with} with and {without} without the reward");
+    let without = recovered(0.0, 0.0);
+    assert!(without < 0.1, "{without} without both");
+    for (reward, smoothness) in [(options().reward, 0.0), (0.0, options().smoothness)] {
+        let with = recovered(reward, smoothness);
+        assert!(with > 0.5, "{with} with reward {reward} and smoothness {smoothness}");
+    }
 }
 
 fn bits(values: &[f32]) -> Vec<u32> {
