@@ -9,6 +9,7 @@ pub mod camera;
 mod capi;
 mod consistency;
 mod error;
+mod filling;
 pub mod fusion;
 pub mod image;
 #[cfg(feature = "io")]
@@ -22,6 +23,7 @@ mod progress;
 mod propagation;
 mod scene;
 pub mod simd;
+mod smoothing;
 mod solve;
 mod state;
 #[cfg(test)]

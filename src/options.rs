@@ -68,6 +68,9 @@ pub struct Options {
 
     /// Half the side of the square window, in pixels.
     pub window_radius: u32,
+    /// The same at full size after coarser scales, where the window is a square; 0 for [`Options::window_radius`] there
+    /// too.
+    pub finest_window_radius: u32,
     /// Distance between samples of the window, in pixels.
     pub window_step: u32,
     /// Whether its corners are left out: a disc of samples instead of a square.
@@ -78,6 +81,9 @@ pub struct Options {
     pub colour_sigma: f64,
     /// Weighted variance under which a window has no texture and costs 2, intensities in [0, 1].
     pub min_variance: f64,
+    /// A window whose variance is less than this many times that of its image's noise is not matched: its pixel takes
+    /// what the surfaces around it go on to. 0 matches all (`paper`).
+    pub noise_ratio: f64,
     /// How the costs of the source views become one.
     pub aggregation: Aggregation,
     /// From the second cycle on a pixel is matched only with this many views of its set, those in which its solution
@@ -97,6 +103,10 @@ pub struct Options {
     pub smoothness_depth: f64,
     /// Angle between normals that contradicts altogether, in degrees.
     pub smoothness_normal: f64,
+
+    /// How often the validated planes are averaged with those around them that continue the same surface, after every
+    /// check; 0 for never (`paper`).
+    pub smoothing_passes: u32,
 
     /// Whether the view set of each pixel is refined by incidence and visibility. Off keeps the start set.
     pub view_selection: bool,
@@ -168,11 +178,13 @@ impl Options {
             trial_limit: 10,
             stop_share: 0.01,
             window_radius: 5,
+            finest_window_radius: 0,
             window_step: 2,
             round_window: false,
             spatial_sigma: 5.0,
             colour_sigma: 0.2,
             min_variance: 1e-5,
+            noise_ratio: 0.0,
             aggregation: Aggregation::AllViews,
             focused_views: 0,
             restart_spread: 0.0,
@@ -180,6 +192,7 @@ impl Options {
             smoothness: 0.0,
             smoothness_depth: 0.01,
             smoothness_normal: 40.0,
+            smoothing_passes: 0,
             view_selection: true,
             triangulation_angle: (10.0, 30.0),
             max_sources: 0,
@@ -299,14 +312,17 @@ impl Default for Options {
                 Scale { halvings: 1, foods: 4, first_iterations: 6, cycles: 4, cycle_iterations: 1 },
                 Scale { halvings: 0, foods: 2, first_iterations: 2, cycles: 3, cycle_iterations: 1 },
             ],
+            finest_window_radius: 3,
             round_window: true,
             spatial_sigma: 3.0,
             colour_sigma: 0.03,
+            noise_ratio: 2.5,
             aggregation: Aggregation::BestViews(4),
             focused_views: 5,
             restart_spread: 0.01,
             restart_tilt: 0.3,
             smoothness: 0.1,
+            smoothing_passes: 1,
             triangulation_angle: (4.0, 40.0),
             max_sources: 16,
             reward: 0.1,

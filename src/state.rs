@@ -37,10 +37,20 @@ pub struct ViewState {
 impl ViewState {
     /// Marks each solution by what the check says of it, and brings the surface up to date.
     pub fn mark(&mut self, camera: &Camera, consistent: &[(u8, bool)]) {
+        self.judge(consistent);
+        self.show(camera);
+    }
+
+    /// Marks each solution by what the check says of it.
+    pub fn judge(&mut self, consistent: &[(u8, bool)]) {
         for (solution, &(count, validated)) in self.solutions.iter_mut().zip(consistent) {
             solution.consistent = count;
             solution.validated = validated;
         }
+    }
+
+    /// Brings the surface up to date with the solutions.
+    pub fn show(&mut self, camera: &Camera) {
         self.surface = surface(camera, &self.solutions);
     }
 

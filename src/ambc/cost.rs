@@ -7,9 +7,10 @@ use crate::kernels::{MAX_COST, ReferencePatch, SlantedPlane, Window, patch_costs
 use crate::maps::Counts;
 use crate::options::{Aggregation, Options};
 use crate::simd::{LANES, Simd};
-use crate::views::{Placements, Reference, Source, ViewSets};
+use crate::views::{Group, Placed, Placements, Reference, ViewSets};
 use glam::Vec3;
-use std::cmp::Ordering;
+
+type Lanes = [f32; LANES];
 
 /// How source views' costs become a hypothesis' cost.
 #[derive(Debug, Clone, Copy)]
@@ -17,6 +18,7 @@ pub struct CostRules {
     aggregation: Aggregation,
     /// Hypotheses in fewer views cost infinitely much.
     min_views: usize,
+    noise_ratio: f32,
     /// Cost per unit of relative disagreement with a validated depth; 0 without the geometric term.
     geometric_weight: f32,
     /// Relative disagreement at which it stops growing.
@@ -33,6 +35,7 @@ impl CostRules {
         CostRules {
             aggregation: options.aggregation,
             min_views: options.min_matched(),
+            noise_ratio: options.noise_ratio as f32,
             geometric_weight: (weight * 100.0) as f32,
             geometric_limit: (options.geometric_limit / 100.0) as f32,
             geometric_unknown: (options.geometric_unknown / 100.0) as f32,
@@ -44,36 +47,38 @@ impl CostRules {
         }
     }
 
-    /// What disagreeing with a source's validated depth costs: bounded, so that a wrong neighbour cannot rule out a
-    /// good match.
+    /// What a hypothesis of this depth costs in the views of a group by disagreeing with their validated depths: bounded,
+    /// so that a wrong neighbour cannot rule out a good match.
     #[inline(always)]
-    fn geometric_cost(&self, source: &Source, x: f32, y: f32, depth: f32) -> f32 {
+    fn geometric_costs(&self, reference: &Reference, group: &Group, placed: &Placed, depth: f32) -> Lanes {
+        let mut costs = [0.0; LANES];
         if self.geometric_weight == 0.0 {
-            return 0.0;
+            return costs;
         }
-        let disagreement = match source.validated_at(x, y) {
-            Some(validated) => (depth * validated.exact - 1.0).abs().min(self.geometric_limit),
-            None => self.geometric_unknown,
-        };
-        self.geometric_weight * disagreement
+        for (lane, &source) in group.sources().iter().enumerate() {
+            let source = &reference.sources[source];
+            let (x, y, z) = (placed.column[lane], placed.row[lane], placed.centre[2][lane]);
+            let disagreement = match source.validated_at(x, y) {
+                Some(validated) => smaller((depth * z * validated.exact - 1.0).abs(), self.geometric_limit),
+                None => self.geometric_unknown,
+            };
+            costs[lane] = self.geometric_weight * disagreement;
+        }
+        costs
     }
 }
 
 /// The largest k of [`Aggregation::BestViews`].
 pub const MAX_BEST_VIEWS: usize = 8;
 
-/// A source view that has the hypothesis at work in its image.
+/// The hypothesis at work in the source views of a group.
 #[derive(Debug, Clone, Copy)]
-struct Candidate {
-    source: usize,
-    /// Where the hypothesis falls, homogeneous.
-    centre: Vec3,
-    /// The least it can cost in this view: the geometric term, and the photometric one as soon as it is known.
-    least: f32,
+struct InViews {
+    placed: Placed,
+    /// The least it can cost in each view that has it in its image: the geometric term, and the photometric one as soon
+    /// as it is known.
+    least: Lanes,
 }
-
-/// Views matched at once, between two looks whether a hypothesis can still win.
-const BATCH: usize = LANES;
 
 /// Evaluates hypotheses of one pixel after the other.
 pub struct Evaluator<'a, S: Simd> {
@@ -83,9 +88,11 @@ pub struct Evaluator<'a, S: Simd> {
     rules: CostRules,
     patch: ReferencePatch,
     has_texture: bool,
+    is_weak: bool,
     ray: Vec3,
     placements: Placements<S>,
-    candidates: Vec<Candidate>,
+    /// One for each group of the pixel's views.
+    views: Vec<InViews>,
     surroundings: Surroundings,
     /// Work done so far.
     pub counts: Counts,
@@ -106,9 +113,10 @@ impl<'a, S: Simd> Evaluator<'a, S> {
             rules,
             patch: ReferencePatch::new(window),
             has_texture: false,
+            is_weak: false,
             ray: Vec3::Z,
             placements: Placements::new(simd, reference),
-            candidates: Vec::with_capacity(reference.sources.len()),
+            views: Vec::with_capacity(reference.sources.len().div_ceil(LANES)),
             surroundings: Surroundings::new(rules.smoothness),
             counts: Counts::default(),
         }
@@ -131,6 +139,8 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     pub fn go_to(&mut self, x: usize, y: usize, set: &[u32]) {
         self.patch.sample(self.simd, self.window, self.reference.image, x, y);
         self.has_texture = self.patch.has_texture(self.window);
+        let noise = self.reference.image.noise.variance(self.reference.image.grey(x, y));
+        self.is_weak = self.patch.variance() < self.rules.noise_ratio * noise;
         let (x, y) = (x as f32, y as f32);
         self.ray = self.reference.ray(x, y);
         self.placements.go_to(x, y, set);
@@ -148,16 +158,30 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         self.has_texture
     }
 
+    /// Whether the pixel's patch varies no more than noise does: nothing can be learned from matching it.
+    #[inline(always)]
+    pub fn is_weak(&self) -> bool {
+        self.is_weak
+    }
+
     /// The cost of a hypothesis if it is below `bound`, else infinity: costs are not negative, so the sum over views
     /// stops as soon as it cannot stay below.
     #[inline(always)]
     pub fn cost(&mut self, food: &FoodSource, bound: f32) -> f32 {
-        self.find_candidates(food);
+        self.place(food);
         let cost = match self.rules.aggregation {
             Aggregation::AllViews => self.all_views(food, bound),
             Aggregation::BestViews(count) => self.best_views(food, bound, count as usize),
         };
         if cost < bound { cost } else { f32::INFINITY }
+    }
+
+    /// Tries the plane in the middle of the neighbours' for the best food source.
+    #[inline(always)]
+    pub fn try_middle(&mut self, food: &mut FoodSource) {
+        if let Some(middle) = self.surroundings.middle(self.ray) {
+            self.challenge(food, &middle, 0.0);
+        }
     }
 
     /// Puts `trial` in the place of a food source if it is better; `reward` is a bonus on its fitness.
@@ -189,152 +213,193 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     /// The mean of `1 - NCC` over the views that have the hypothesis in their image: the confidence.
     #[inline(always)]
     pub fn mean_photometric_cost(&mut self, food: &FoodSource) -> f32 {
-        self.find_candidates(food);
-        self.candidates.iter_mut().for_each(|candidate| candidate.least = 0.0);
-        self.add_photometric_costs(&food.plane(self.reference, self.ray), 0, self.candidates.len());
-        let sum: f32 = self.candidates.iter().map(|candidate| candidate.least).sum();
-        if self.candidates.is_empty() { MAX_COST } else { sum / self.candidates.len() as f32 }
+        self.place(food);
+        let plane = food.plane(self.reference, self.ray);
+        let (mut sum, mut count) = (0.0, 0);
+        for group in 0..self.views.len() {
+            self.views[group].least = [0.0; LANES];
+            self.add_photometric_costs(&plane, group);
+            let InViews { placed, least } = &self.views[group];
+            for (lane, cost) in least.iter().enumerate() {
+                if placed.inside >> lane & 1 != 0 {
+                    (sum, count) = (sum + cost, count + 1);
+                }
+            }
+        }
+        if count == 0 { MAX_COST } else { sum / count as f32 }
     }
 
     /// Keeps, for the hypotheses to come, only `count` views, writes them to `set` and gives the cost of this one: the
     /// views whose validated surfaces agree best with it, or, where too few do, those in which it costs least.
     #[inline(always)]
     pub fn focus(&mut self, food: &FoodSource, count: usize, set: &mut [u32]) -> f32 {
-        self.find_candidates(food);
+        self.place(food);
         let unknown = self.rules.geometric_weight * self.rules.geometric_unknown;
-        let agreeing = self.candidates.iter().filter(|candidate| candidate.least < unknown).count();
-        let all = self.candidates.len();
-        if all > count {
-            if agreeing < count {
-                self.add_photometric_costs(&food.plane(self.reference, self.ray), 0, all);
-            }
-            let rank = |candidate: &Candidate| (candidate.least, candidate.source);
-            self.candidates.sort_unstable_by(|a, b| rank(a).partial_cmp(&rank(b)).unwrap_or(Ordering::Equal));
-            self.candidates.truncate(count);
+        let agreeing: usize = (self.views.iter())
+            .map(|InViews { placed, least }| {
+                (0..LANES).filter(|&lane| placed.inside >> lane & 1 != 0 && least[lane] < unknown).count()
+            })
+            .sum();
+        let all = self.seen();
+        if all > count && agreeing < count {
+            let plane = food.plane(self.reference, self.ray);
+            (0..self.views.len()).for_each(|group| self.add_photometric_costs(&plane, group));
         }
-        if self.candidates.len() >= self.rules.min_views {
+        let kept = all.min(count);
+        if kept >= self.rules.min_views {
             set.fill(0);
-            for candidate in &self.candidates {
-                ViewSets::insert_into(set, candidate.source);
+            for _ in 0..kept {
+                let mut best = (f32::INFINITY, 0, 0);
+                for (group, InViews { placed, least }) in self.views.iter().enumerate() {
+                    for (lane, &cost) in least.iter().enumerate() {
+                        let source = self.placements.groups()[group].sources().get(lane).copied();
+                        let is_free = source.is_some_and(|source| !ViewSets::holds(set, source));
+                        if placed.inside >> lane & 1 != 0 && is_free && cost < best.0 {
+                            best = (cost, group, lane);
+                        }
+                    }
+                }
+                ViewSets::insert_into(set, self.placements.groups()[best.1].sources()[best.2]);
             }
             self.placements.keep(set);
         }
-        match self.rules.aggregation {
-            Aggregation::BestViews(best) if all > count && agreeing < count => {
-                let best = (best as usize).min(count);
-                sum_of_least(&self.candidates, best) / best as f32
-            }
-            _ => self.cost(food, f32::INFINITY),
+        self.cost(food, f32::INFINITY)
+    }
+
+    /// Finds where a hypothesis falls in the views of the set. A view whose image its centre leaves does not count.
+    #[inline(always)]
+    fn place(&mut self, food: &FoodSource) {
+        let Evaluator { simd, placements, views, reference, rules, .. } = self;
+        views.clear();
+        for group in placements.groups() {
+            let placed = group.place(*simd, food.depth);
+            let least = rules.geometric_costs(reference, group, &placed, food.depth);
+            views.push(InViews { placed, least });
         }
     }
 
-    /// A view whose image the hypothesis' centre leaves does not count for it.
+    /// Number of views that have the hypothesis in their image.
     #[inline(always)]
-    fn find_candidates(&mut self, food: &FoodSource) {
-        let Evaluator { placements, candidates, reference, rules, .. } = self;
-        candidates.clear();
-        placements.find(
-            food.depth,
-            #[inline(always)]
-            |at| {
-                let depth = at.centre.z * food.depth;
-                let least = rules.geometric_cost(&reference.sources[at.source], at.x, at.y, depth);
-                candidates.push(Candidate { source: at.source, centre: at.centre, least });
-            },
-        );
+    fn seen(&self) -> usize {
+        self.views.iter().map(|view| view.placed.inside.count_ones() as usize).sum()
     }
 
-    /// Adds what the hypothesis costs in these candidates by their images.
+    /// Adds what the hypothesis costs in the views of a group by their images.
     #[inline(always)]
-    fn add_photometric_costs(&mut self, plane: &SlantedPlane, start: usize, end: usize) {
+    fn add_photometric_costs(&mut self, plane: &SlantedPlane, group: usize) {
+        let Evaluator { simd, window, patch, reference, placements, views, .. } = self;
+        let (group, InViews { placed, least }) = (&placements.groups()[group], &mut views[group]);
         if !self.has_texture {
-            self.candidates[start..end].iter_mut().for_each(|candidate| candidate.least += MAX_COST);
+            least.iter_mut().for_each(|least| *least += MAX_COST);
             return;
         }
-        let Evaluator { simd, window, patch, reference, .. } = self;
-        for batch in self.candidates[start..end].chunks_mut(LANES) {
-            let candidates: &[Candidate] = batch;
-            let costs = patch_costs(
-                *simd,
-                window,
-                patch,
-                #[inline(always)]
-                |index| {
-                    let Candidate { source, centre, .. } = candidates[index];
-                    let source = &reference.sources[source];
-                    (source.image, source.pose.homography_about(centre, plane))
-                },
-                batch.len(),
-            );
-            for (candidate, cost) in batch.iter_mut().zip(costs) {
-                candidate.least += cost;
-            }
+        let slopes = group.slopes(*simd, plane);
+        let costs = patch_costs(
+            *simd,
+            window,
+            patch,
+            #[inline(always)]
+            |lane| (reference.sources[group.sources()[lane]].image, placed.homography(&slopes, lane)),
+            placed.inside,
+        );
+        for (least, cost) in least.iter_mut().zip(costs) {
+            *least += cost;
         }
-        self.counts.ncc_evaluations += (end - start) as u64;
+        self.counts.ncc_evaluations += u64::from(placed.inside.count_ones());
     }
 
     /// Equation 3 of the paper: a small set is penalised.
     #[inline(always)]
     fn all_views(&mut self, food: &FoodSource, bound: f32) -> f32 {
-        let count = self.candidates.len();
+        let count = self.seen();
         if count <= 1 {
             return f32::INFINITY;
         }
         let plane = food.plane(self.reference, self.ray);
         let divisor = (count - 1) as f32;
-        let sum =
-            |candidates: &[Candidate]| -> f32 { candidates.iter().map(|candidate| candidate.least).sum() };
-        for start in (0..count).step_by(BATCH) {
-            if sum(&self.candidates) >= bound * divisor {
+        for group in 0..self.views.len() {
+            if sum(&self.views) >= bound * divisor {
                 self.counts.early_outs += 1;
                 return f32::INFINITY;
             }
-            self.add_photometric_costs(&plane, start, count.min(start + BATCH));
+            self.add_photometric_costs(&plane, group);
         }
-        sum(&self.candidates) / divisor
+        sum(&self.views) / divisor
     }
 
     /// The mean over the best views of the set; views that cannot see the point do not raise it.
     #[inline(always)]
     fn best_views(&mut self, food: &FoodSource, bound: f32, best: usize) -> f32 {
-        let count = self.candidates.len();
+        let count = self.seen();
         if count < self.rules.min_views {
             return f32::INFINITY;
         }
         let plane = food.plane(self.reference, self.ray);
         let best = best.min(count);
         let limit = bound * best as f32;
-        for start in (0..count).step_by(BATCH) {
-            // In between, the views not yet looked at are enough to be the best ones.
-            if (start == 0 || start + best > count) && sum_of_least(&self.candidates, best) >= limit {
+        for group in 0..self.views.len() {
+            if sum_of_least(&self.views, count, best) >= limit {
                 self.counts.early_outs += 1;
                 return f32::INFINITY;
             }
-            self.add_photometric_costs(&plane, start, count.min(start + BATCH));
+            self.add_photometric_costs(&plane, group);
         }
-        sum_of_least(&self.candidates, best) / best as f32
+        sum_of_least(&self.views, count, best) / best as f32
     }
 }
 
-/// The sum of the `best` smallest costs.
+/// The costs in the views that have the hypothesis in their image.
 #[inline(always)]
-fn sum_of_least(candidates: &[Candidate], best: usize) -> f32 {
-    let costs = candidates.iter().map(|candidate| candidate.least);
-    if candidates.len() == best {
-        return costs.sum();
-    }
-    if candidates.len() == best + 1 {
-        let largest = costs.clone().fold(0.0, larger);
-        return costs.sum::<f32>() - largest;
-    }
-    let mut least = [f32::INFINITY; MAX_BEST_VIEWS];
-    for mut cost in costs {
-        // Without branches: which costs are small cannot be predicted.
-        for place in &mut least {
-            (*place, cost) = (smaller(*place, cost), larger(*place, cost));
+fn sum(views: &[InViews]) -> f32 {
+    let mut sum = 0.0;
+    for InViews { placed, least } in views {
+        for (lane, cost) in least.iter().enumerate() {
+            sum += if placed.inside >> lane & 1 != 0 { *cost } else { 0.0 };
         }
     }
-    least[..best].iter().sum()
+    sum
+}
+
+/// The sum of the `best` smallest of those `count` costs.
+#[inline(always)]
+fn sum_of_least(views: &[InViews], count: usize, best: usize) -> f32 {
+    if count == best {
+        return sum(views);
+    }
+    if count == best + 1 {
+        let mut largest = 0.0;
+        for InViews { placed, least } in views {
+            for (lane, &cost) in least.iter().enumerate() {
+                largest = larger(largest, if placed.inside >> lane & 1 != 0 { cost } else { 0.0 });
+            }
+        }
+        return sum(views) - largest;
+    }
+    match best {
+        1 => sum_of::<1>(views),
+        2 => sum_of::<2>(views),
+        3 => sum_of::<3>(views),
+        4 => sum_of::<4>(views),
+        5 => sum_of::<5>(views),
+        6 => sum_of::<6>(views),
+        7 => sum_of::<7>(views),
+        _ => sum_of::<MAX_BEST_VIEWS>(views),
+    }
+}
+
+#[inline(always)]
+fn sum_of<const BEST: usize>(views: &[InViews]) -> f32 {
+    let mut least = [f32::INFINITY; BEST];
+    for InViews { placed, least: costs } in views {
+        for (lane, &cost) in costs.iter().enumerate() {
+            let mut cost = if placed.inside >> lane & 1 != 0 { cost } else { f32::INFINITY };
+            // Without branches: which costs are small cannot be predicted.
+            for place in &mut least {
+                (*place, cost) = (smaller(*place, cost), larger(*place, cost));
+            }
+        }
+    }
+    least.iter().sum()
 }
 
 /// Costs are numbers: `f32::min` would look for others.

@@ -15,5 +15,5 @@ mod tests;
 pub use colony::Offer;
 pub use cost::CostRules;
 pub use food::{FoodSource, MIN_FACING};
-pub use random::stream;
+pub use random::{Random, stream};
 pub use schedule::{Assessment, BAND_ROWS, Search, assess};

@@ -7,7 +7,7 @@ use super::food::FoodSource;
 use super::random::{Random, stream};
 use super::{employed, onlooker, scout};
 use crate::error::{Error, Result};
-use crate::kernels::Window;
+use crate::kernels::{MAX_COST, Window};
 use crate::maps::Counts;
 use crate::simd::{Level, Simd, Task, dispatch};
 use crate::state::Solution;
@@ -61,6 +61,8 @@ pub struct SearchOutcome {
     pub best: Vec<FoodSource>,
     /// The view set each pixel was matched with.
     pub sets: ViewSets,
+    /// The pixels that were not searched because their images show nothing but noise.
+    pub weak: Vec<bool>,
     /// Work done.
     pub counts: Counts,
 }
@@ -96,11 +98,12 @@ impl Task for SearchTask<'_> {
             [Colonies::new(width, height, search.foods), Colonies::new(width, height, search.foods)];
         let mut sets = ViewSets::full(width * height, search.reference.sources.len());
         let mut focus = sets.clone();
-        let mut counts = initialise(simd, search, &mut colonies, &mut sets, &mut focus)?;
+        let mut weak = vec![false; width * height];
+        let mut counts = initialise(simd, search, &mut colonies, (&mut sets, &mut focus), &mut weak)?;
         for iteration in 0..search.iterations {
             let [first, second] = &mut colonies;
-            counts += iterate(simd, search, (iteration, 0), first, second, &focus)?;
-            counts += iterate(simd, search, (iteration, 1), second, first, &focus)?;
+            counts += iterate(simd, search, (iteration, 0), first, second, (&focus, &weak))?;
+            counts += iterate(simd, search, (iteration, 1), second, first, (&focus, &weak))?;
         }
         counts.samples = counts.ncc_evaluations * search.window.samples();
         let best = (0..width * height)
@@ -109,14 +112,17 @@ impl Task for SearchTask<'_> {
                 *colonies[colour(x, y)].best(x, y)
             })
             .collect();
-        Ok(SearchOutcome { best, sets, counts })
+        Ok(SearchOutcome { best, sets, weak, counts })
     }
 }
 
 /// The pixels of a band, tile by tile; `x` and the row within the band.
 fn tiled(width: usize, rows: usize) -> impl Iterator<Item = (usize, usize)> {
-    (0..width).step_by(TILE_COLUMNS).flat_map(move |left| {
-        (0..rows).flat_map(move |row| (left..width.min(left + TILE_COLUMNS)).map(move |x| (x, row)))
+    let tile = TILE_COLUMNS * rows;
+    (0..width * rows).map(move |place| {
+        let left = place / tile * TILE_COLUMNS;
+        let (within, columns) = (place % tile, TILE_COLUMNS.min(width - left));
+        (left + within % columns, within / columns)
     })
 }
 
@@ -134,8 +140,8 @@ fn initialise<S: Simd>(
     simd: S,
     search: &Search,
     colonies: &mut [Colonies; 2],
-    sets: &mut ViewSets,
-    focus: &mut ViewSets,
+    (sets, focus): (&mut ViewSets, &mut ViewSets),
+    weak: &mut [bool],
 ) -> Result<Counts> {
     let (width, height) = (search.width(), search.height());
     let words = sets.words_per_pixel();
@@ -148,8 +154,9 @@ fn initialise<S: Simd>(
         .zip(second.foods.par_chunks_mut(band_foods))
         .zip(sets.words_mut().par_chunks_mut(BAND_ROWS * width * words))
         .zip(focus.words_mut().par_chunks_mut(BAND_ROWS * width * words))
+        .zip(weak.par_chunks_mut(BAND_ROWS * width))
         .enumerate();
-    total(bands.map(|(band, (((first, second), sets), focus))| {
+    total(bands.map(|(band, ((((first, second), sets), focus), weak))| {
         if (search.cancelled)() {
             return None;
         }
@@ -169,6 +176,7 @@ fn initialise<S: Simd>(
                     let colony = &mut foods[row * row_foods + x / 2 * search.foods..][..search.foods];
                     let mut random = Random::new(search.stream, (y * width + x) as u64);
                     fill_colony(search, &mut evaluator, colony, (set, focus), (x, y), &mut random);
+                    weak[row * width + x] = evaluator.is_weak();
                 }
                 evaluator.counts
             },
@@ -195,7 +203,16 @@ fn fill_colony<S: Simd>(
     }
     evaluator.go_to(x, y, set);
     let ray = evaluator.ray();
-    let strata = colony.len() as f32;
+    if evaluator.is_weak() {
+        let food = match start {
+            Some(start) => {
+                FoodSource { validated: start.validated, ..FoodSource::new(start.depth, start.normal) }
+            }
+            None => FoodSource::random(reference, ray, random, (0.0, 1.0)),
+        };
+        colony[0] = FoodSource { cost: MAX_COST, ..food };
+        return;
+    }
     let mut next = 0;
     let first = usize::from(start.is_some());
     if let Some(start) = start {
@@ -214,12 +231,14 @@ fn fill_colony<S: Simd>(
         colony[next] = FoodSource::new(offer.depth, offer.normal);
         next += 1;
     }
+    let strata = (colony.len() - next) as f32;
     for index in next..colony.len() {
         let (spread, tilt) = search.around_start;
         colony[index] = if spread > 0.0 && start.is_some_and(|start| start.validated || index == 1) {
             colony[0].nearby(reference, ray, random, spread, tilt)
         } else {
-            let part = (index as f32 / strata, (index + 1) as f32 / strata);
+            let stratum = (index - next) as f32;
+            let part = (stratum / strata, (stratum + 1.0) / strata);
             FoodSource::random(reference, ray, random, part)
         };
     }
@@ -236,7 +255,7 @@ fn iterate<S: Simd>(
     (iteration, turn): (u32, usize),
     colonies: &mut Colonies,
     neighbours: &Colonies,
-    focus: &ViewSets,
+    (focus, weak): (&ViewSets, &[bool]),
 ) -> Result<Counts> {
     let (width, height) = (search.width(), search.height());
     let row_foods = colonies.row_len();
@@ -254,7 +273,7 @@ fn iterate<S: Simd>(
                 for (x, row) in tiled(width, rows) {
                     let y = band * BAND_ROWS + row;
                     let pixel = y * width + x;
-                    if colour(x, y) != turn || !search.is_wanted(pixel) {
+                    if colour(x, y) != turn || !search.is_wanted(pixel) || weak[pixel] {
                         continue;
                     }
                     let colony = &mut foods[row * row_foods + x / 2 * search.foods..][..search.foods];
@@ -262,6 +281,7 @@ fn iterate<S: Simd>(
                     evaluator.go_to(x, y, focus.words_of(pixel));
                     evaluator.look_around(neighbours, (x, y));
                     evaluator.best_first(colony);
+                    evaluator.try_middle(&mut colony[0]);
                     employed::send(&mut evaluator, colony, &mut random);
                     onlooker::send(&mut evaluator, colony, neighbours, (x, y), search.reward, &mut random);
                     evaluator.best_first(colony);
@@ -331,7 +351,7 @@ impl Task for AssessTask<'_> {
                         search.view_rules.select(search.reference, set, (x as f32, y as f32), depth, normal);
                         evaluator.go_to(x, y, set);
                         cost[place] = evaluator.mean_photometric_cost(&FoodSource::new(depth, normal));
-                        textured[place] = evaluator.has_texture();
+                        textured[place] = evaluator.has_texture() && !evaluator.is_weak();
                     }
                     evaluator.counts
                 },

@@ -1,6 +1,6 @@
 //! The layout the kernels sample: the four taps of a bilinear sample in 32 consecutive bits.
 
-use super::Picture;
+use super::{Noise, Picture};
 
 /// An image of pairs: the one at (x, y) holds the grey values of (x, y) and (x, y + 1), lower byte first, so that two
 /// neighbouring pairs are the four taps of a bilinear sample. The last row repeats itself, and each row ends in a copy of
@@ -13,6 +13,8 @@ pub struct PackedImage {
     pub height: usize,
     /// The pairs, row by row, `width + 1` in each.
     pub pairs: Vec<u16>,
+    /// Its noise.
+    pub noise: Noise,
 }
 
 impl PackedImage {
@@ -26,7 +28,7 @@ impl PackedImage {
             pairs.extend(top.iter().zip(bottom).map(|(&top, &bottom)| u16::from_le_bytes([top, bottom])));
             pairs.push(u16::from_le_bytes([top[width - 1], bottom[width - 1]]));
         }
-        PackedImage { width, height, pairs }
+        PackedImage { width, height, pairs, noise: Noise::of(picture) }
     }
 
     /// Pairs of a row.

@@ -140,6 +140,11 @@ impl ReferencePatch {
         self.variance >= window.min_variance
     }
 
+    /// Weighted variance of the grey values, in squared grey values of 0 to 255.
+    pub fn variance(&self) -> f32 {
+        self.variance
+    }
+
     /// Samples the patch around a pixel. What lies outside the image weighs nothing.
     #[inline(always)]
     pub fn sample<S: Simd>(&mut self, simd: S, window: &Window, image: &PackedImage, x: usize, y: usize) {
@@ -253,7 +258,7 @@ pub fn patch_cost<S: Simd>(
     }
 }
 
-/// The [`patch_cost`] in the first `count` source views, at most eight, to the bit; [`MAX_COST`] in the other lanes.
+/// The [`patch_cost`] in the source views of the lanes whose bits are `wanted`, to the bit; [`MAX_COST`] in the others.
 /// What is left to do after the samples is shared by all views.
 #[inline(always)]
 pub fn patch_costs<'a, S: Simd>(
@@ -261,13 +266,16 @@ pub fn patch_costs<'a, S: Simd>(
     window: &Window,
     patch: &ReferencePatch,
     mut view: impl FnMut(usize) -> (&'a PackedImage, PatchHomography),
-    count: usize,
+    wanted: u8,
 ) -> [f32; LANES] {
     let zero = simd.splat(0.0);
     let (mut sums, mut squares, mut products) = ([zero; LANES], [zero; LANES], [zero; LANES]);
-    for index in 0..count.min(LANES) {
-        let (source, homography) = view(index);
-        [sums[index], squares[index], products[index]] = correlate(simd, window, patch, source, &homography);
+    let mut rest = wanted;
+    while rest != 0 {
+        let lane = rest.trailing_zeros() as usize % LANES;
+        rest &= rest - 1;
+        let (source, homography) = view(lane);
+        [sums[lane], squares[lane], products[lane]] = correlate(simd, window, patch, source, &homography);
     }
     let (sum, squares, products) = (simd.sums(&sums), simd.sums(&squares), simd.sums(&products));
     let variance = simd.sub(squares, simd.mul(sum, sum));

@@ -28,7 +28,8 @@ use rayon::prelude::*;
 pub struct Steps {
     pub(super) options: Options,
     pub(super) level: Level,
-    pub(super) window: Window,
+    /// By scale.
+    windows: Vec<Window>,
     pub(super) sources: SourceLists,
     steps: Vec<Step>,
     /// By scale and view.
@@ -47,18 +48,10 @@ impl Steps {
     /// [`Steps::new`] that can be cancelled.
     pub(super) fn new_with(scene: &Scene, options: &Options, cancelled: Cancelled) -> Result<Steps> {
         options.check()?;
-        let make_window = if options.round_window { Window::disc } else { Window::new };
-        let window = make_window(
-            options.window_radius,
-            options.window_step,
-            options.spatial_sigma,
-            options.colour_sigma,
-            options.min_variance,
-        );
         Ok(Steps {
             options: options.clone(),
             level: options.simd.unwrap_or_else(Level::detect),
-            window,
+            windows: (0..options.scales.len()).map(|scale| window(options, scale)).collect(),
             sources: source_lists(scene, options),
             steps: Step::all(options),
             scaled: (options.scales.iter())
@@ -92,6 +85,11 @@ impl Steps {
     /// What the host's user should know about the choice of source views, in sentences.
     pub fn warnings(&self) -> &[String] {
         &self.sources.warnings
+    }
+
+    /// The window of the patches on the scale of a step.
+    pub(super) fn window(&self, step: usize) -> &Window {
+        &self.windows[self.steps[step].scale_index]
     }
 
     /// A view on the scale of a step.
@@ -214,4 +212,16 @@ impl Steps {
         let handed_up = state.solved.refined(&self.scaled[coarser][view].camera, &fine.camera, fine.range);
         Ok(state.on_finer_scale(step, handed_up))
     }
+}
+
+/// The window of a scale. At full size a coarser scale has found the surfaces: a smaller window keeps to one of them at
+/// edges.
+fn window(options: &Options, scale: usize) -> Window {
+    let is_finest = scale > 0 && options.scales[scale].halvings == 0 && options.finest_window_radius > 0;
+    let (radius, is_round) = match is_finest {
+        true => (options.finest_window_radius, false),
+        false => (options.window_radius, options.round_window),
+    };
+    let make = if is_round { Window::disc } else { Window::new };
+    make(radius, options.window_step, options.spatial_sigma, options.colour_sigma, options.min_variance)
 }

@@ -41,7 +41,7 @@ impl Steps {
         };
         let reference = self.reference(step, view, states);
         let cancelled = || advance(0);
-        let mut search = self.plain_search(&reference, true, &cancelled);
+        let mut search = self.plain_search(step, &reference, true, &cancelled);
         // A set that falls back to the start set would hide that nothing sees the solution.
         search.view_rules = ViewRules::new(&self.options, 0);
         let assessment = assess(&search, &own.solved.solutions)?;

@@ -5,11 +5,13 @@ use super::state::State;
 use crate::ambc::{BAND_ROWS, CostRules, FoodSource, Offer, Search, stream};
 use crate::consistency::{self, ConsistencyRules};
 use crate::error::{Error, Result};
+use crate::filling::fill;
 use crate::image::ScaledView;
 use crate::maps::CycleRecord;
 use crate::options::Aggregation;
 use crate::progress::{Cancelled, Hook, Phase, Tracker};
 use crate::propagation::{self, Giver};
+use crate::smoothing::smooth;
 use crate::state::{Solution, ViewState};
 use crate::views::{Reference, Source, ViewRules, ViewSets};
 
@@ -137,9 +139,16 @@ impl Steps {
                 iterations: schedule.iterations(),
                 around_start: self.around_start(schedule.cycle),
                 stream: stream(&[self.options.seed, view as u64, schedule.scale_index as u64, cycle]),
-                ..self.plain_search(&reference, is_guided, &cancelled)
+                ..self.plain_search(step, &reference, is_guided, &cancelled)
             };
-            let found = search.run()?;
+            let mut found = search.run()?;
+            let words = found.sets.words_per_pixel();
+            for pixel in fill(&reference, &mut found.best, &found.weak) {
+                let FoodSource { depth, normal, .. } = found.best[pixel];
+                let at = ((pixel % reference.image.width) as f32, (pixel / reference.image.width) as f32);
+                let set = &mut found.sets.words_mut()[pixel * words..][..words];
+                search.view_rules.select(&reference, set, at, depth, normal);
+            }
             state.counts += found.counts;
             let solution = |food: &FoodSource| Solution {
                 depth: food.depth,
@@ -209,7 +218,12 @@ impl Steps {
                 format!("the {} pixels of view {}, whose state it is", state.pixels(), state.view());
             return Err(Error::argument("verdicts", value, expected));
         }
-        state.solved.mark(&self.scaled(state.step(), view).camera, &verdicts.0);
+        let ScaledView { camera, image, range, .. } = self.scaled(state.step(), view);
+        state.solved.judge(&verdicts.0);
+        for _ in 0..self.options.smoothing_passes {
+            smooth(camera, image, *range, &mut state.solved.solutions);
+        }
+        state.solved.show(camera);
         state.marked = true;
         let validated = state.solved.validated();
         if let Some(record) = state.cycles.last_mut() {
@@ -221,6 +235,7 @@ impl Steps {
     /// A search with everything that all searches have in common; one that is guided has validated solutions to look at.
     pub(super) fn plain_search<'b>(
         &'b self,
+        step: usize,
         reference: &'b Reference<'b>,
         is_guided: bool,
         cancelled: &'b (dyn Fn() -> bool + Sync),
@@ -232,7 +247,7 @@ impl Steps {
         };
         Search {
             reference,
-            window: &self.window,
+            window: self.window(step),
             cost_rules: CostRules::new(&self.options, is_guided),
             view_rules: ViewRules::new(&self.options, min_views),
             mask: None,

@@ -8,7 +8,7 @@ mod select;
 mod set;
 
 pub use angle::{SourceLists, source_lists, triangulation_angle};
-pub use placement::{Placement, Placements};
+pub use placement::{Group, Placed, Placements};
 pub use reference::{Reference, Source};
 pub use select::{ViewRules, faces_source, is_occluded};
 pub use set::ViewSets;

@@ -1,132 +1,182 @@
 //! Where a pixel's hypothesis falls in its source views, eight views at a time.
 
 use super::{Reference, Source};
+use crate::kernels::{PatchHomography, SlantedPlane};
 use crate::simd::{LANES, Simd};
 use glam::Vec3;
 
 type Lanes = [f32; LANES];
 
-/// The source views of a reference view, and where the pixel at work lies in them for any depth.
+/// The source views of a pixel's view set, and where the pixel lies in them for any depth.
 #[derive(Debug, Clone)]
 pub struct Placements<S: Simd> {
     simd: S,
+    views: Vec<Fixed>,
     groups: Vec<Group>,
+    /// Groups that hold the views of the set.
+    used: usize,
+    pixel: (f32, f32),
 }
 
-/// Eight source views; lanes without one have an empty image.
-#[derive(Debug, Clone)]
-struct Group {
-    /// Columns of `K'R K^-1`, each as its three coordinates.
-    infinite: [[Lanes; 3]; 3],
+/// What of a source view does not depend on the pixel.
+#[derive(Debug, Clone, Copy)]
+struct Fixed {
+    /// Columns of `K'R K^-1`.
+    infinite: [Vec3; 3],
     /// `K't`.
-    epipole: [Lanes; 3],
+    epipole: Vec3,
     /// The last column and row of the image.
+    corner: [f32; 2],
+}
+
+/// Up to eight source views, one a lane.
+#[derive(Debug, Clone)]
+pub struct Group {
+    count: usize,
+    sources: [usize; LANES],
+    infinite: [[Lanes; 3]; 3],
+    epipole: [Lanes; 3],
+    /// -1 in the lanes without a view: nothing lies inside their images.
     corner: [Lanes; 2],
     /// `K'R K^-1 [x y 1]` of the pixel at work.
     at_infinity: [Lanes; 3],
-    /// The sources of the pixel's view set, as bits.
-    wanted: u8,
 }
 
-/// Where a hypothesis falls in a source view that has it in its image.
+/// Where a hypothesis falls in the views of a group.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Placement {
-    /// Place of the source in the reference's list.
-    pub source: usize,
-    /// The homogeneous pixel; its third coordinate is the depth there by that in the reference view.
-    pub centre: Vec3,
-    /// Column in pixels.
-    pub x: f32,
-    /// Row in pixels.
-    pub y: f32,
+pub struct Placed {
+    /// The homogeneous pixels; the third coordinate is the depth there by that in the reference view.
+    pub centre: [Lanes; 3],
+    /// Columns in pixels, within the image.
+    pub column: Lanes,
+    /// Rows in pixels, within the image.
+    pub row: Lanes,
+    /// The lanes whose view has the hypothesis in its image, as bits.
+    pub inside: u8,
 }
 
 impl<S: Simd> Placements<S> {
-    /// The sources of a reference view, with all of them in the set.
+    /// The sources of a reference view, none of them taken yet.
     pub fn new(simd: S, reference: &Reference) -> Placements<S> {
-        let group = |sources: &[Source]| {
-            let lanes = |get: &dyn Fn(&Source) -> f32, none: f32| -> Lanes {
-                std::array::from_fn(|lane| sources.get(lane).map_or(none, get))
-            };
-            let coordinates = |get: &dyn Fn(&Source) -> Vec3| -> [Lanes; 3] {
-                std::array::from_fn(|axis| lanes(&|source| get(source)[axis], 0.0))
-            };
-            Group {
-                infinite: std::array::from_fn(|column| coordinates(&|source| source.pose.infinite[column])),
-                epipole: coordinates(&|source| source.pose.epipole),
-                corner: [
-                    lanes(&|source| (source.image.width - 1) as f32, -1.0),
-                    lanes(&|source| (source.image.height - 1) as f32, -1.0),
-                ],
-                at_infinity: [[0.0; LANES]; 3],
-                wanted: u8::MAX,
-            }
+        let fixed = |source: &Source| Fixed {
+            infinite: source.pose.infinite,
+            epipole: source.pose.epipole,
+            corner: [(source.image.width - 1) as f32, (source.image.height - 1) as f32],
         };
-        Placements { simd, groups: reference.sources.chunks(LANES).map(group).collect() }
+        let views: Vec<Fixed> = reference.sources.iter().map(fixed).collect();
+        let groups = vec![Group::new(); views.len().div_ceil(LANES)];
+        Placements { simd, views, groups, used: 0, pixel: (0.0, 0.0) }
     }
 
     /// Goes to a pixel and takes the source views of its set.
     #[inline(always)]
     pub fn go_to(&mut self, x: f32, y: f32, set: &[u32]) {
-        let simd = self.simd;
-        let (x, y) = (simd.splat(x), simd.splat(y));
-        for (index, group) in self.groups.iter_mut().enumerate() {
-            let [along_x, along_y, origin] = &group.infinite;
-            for (axis, at) in group.at_infinity.iter_mut().enumerate() {
-                let start = simd.mul(simd.load(&along_x[axis]), x);
-                let moved = simd.mul_add(simd.load(&along_y[axis]), y, start);
-                *at = simd.store(simd.add(moved, simd.load(&origin[axis])));
-            }
-            group.wanted = byte_of(set, index);
-        }
+        self.pixel = (x, y);
+        self.keep(set);
     }
 
     /// Takes another set of source views for the same pixel.
     #[inline(always)]
     pub fn keep(&mut self, set: &[u32]) {
-        for (index, group) in self.groups.iter_mut().enumerate() {
-            group.wanted = byte_of(set, index);
+        let mut taken = 0;
+        for (index, &word) in set.iter().enumerate() {
+            let mut rest = word;
+            while rest != 0 {
+                let source = index * 32 + rest.trailing_zeros() as usize;
+                rest &= rest - 1;
+                self.groups[taken / LANES].take(taken % LANES, source, &self.views[source]);
+                taken += 1;
+            }
+        }
+        self.used = taken.div_ceil(LANES);
+        for (index, group) in self.groups[..self.used].iter_mut().enumerate() {
+            group.close((taken - index * LANES).min(LANES));
+            group.go_to(self.simd, self.pixel);
         }
     }
 
-    /// Where the hypothesis at this depth falls in the sources of the set that have it in their image, in their order.
+    /// The views of the set, in their order.
     #[inline(always)]
-    pub fn find(&self, depth: f32, mut found: impl FnMut(Placement)) {
-        let simd = self.simd;
-        let (zero, inverse_depth) = (simd.splat(0.0), simd.splat(1.0 / depth));
-        for (index, group) in self.groups.iter().enumerate() {
-            if group.wanted == 0 {
-                continue;
-            }
-            let (x, y, z) = (
-                group.coordinate(simd, 0, inverse_depth),
-                group.coordinate(simd, 1, inverse_depth),
-                group.coordinate(simd, 2, inverse_depth),
-            );
-            let inverse_z = simd.div(simd.splat(1.0), z);
-            let (column, row) = (simd.mul(x, inverse_z), simd.mul(y, inverse_z));
-            let [right, bottom] = [simd.load(&group.corner[0]), simd.load(&group.corner[1])];
-            let (to_right, to_bottom) = (simd.sub(right, column), simd.sub(bottom, row));
-            let margin = simd.min(simd.min(column, row), simd.min(to_right, to_bottom));
-            let in_front = simd.at_least(z, simd.splat(f32::MIN_POSITIVE));
-            let mut inside = simd.at_least(margin, zero) & in_front & group.wanted;
-            let [x, y, z] = [simd.store(x), simd.store(y), simd.store(z)];
-            let [column, row] = [simd.store(column), simd.store(row)];
-            while inside != 0 {
-                let lane = inside.trailing_zeros() as usize % LANES;
-                inside &= inside - 1;
-                found(Placement {
-                    source: index * LANES + lane,
-                    centre: Vec3::new(x[lane], y[lane], z[lane]),
-                    x: column[lane],
-                    y: row[lane],
-                });
-            }
-        }
+    pub fn groups(&self) -> &[Group] {
+        &self.groups[..self.used]
     }
 }
 
 impl Group {
+    fn new() -> Group {
+        let zeros = [0.0; LANES];
+        Group {
+            count: 0,
+            sources: [0; LANES],
+            infinite: [[zeros; 3]; 3],
+            epipole: [zeros; 3],
+            corner: [zeros; 2],
+            at_infinity: [zeros; 3],
+        }
+    }
+
+    #[inline(always)]
+    fn take(&mut self, lane: usize, source: usize, view: &Fixed) {
+        self.sources[lane] = source;
+        for axis in 0..3 {
+            for column in 0..3 {
+                self.infinite[column][axis][lane] = view.infinite[column][axis];
+            }
+            self.epipole[axis][lane] = view.epipole[axis];
+        }
+        self.corner[0][lane] = view.corner[0];
+        self.corner[1][lane] = view.corner[1];
+    }
+
+    /// Empties the lanes from this one on.
+    #[inline(always)]
+    fn close(&mut self, count: usize) {
+        self.count = count;
+        for lane in count..LANES {
+            self.corner[0][lane] = -1.0;
+            self.corner[1][lane] = -1.0;
+        }
+    }
+
+    #[inline(always)]
+    fn go_to<S: Simd>(&mut self, simd: S, (x, y): (f32, f32)) {
+        let (x, y) = (simd.splat(x), simd.splat(y));
+        let [along_x, along_y, origin] = &self.infinite;
+        for (axis, at) in self.at_infinity.iter_mut().enumerate() {
+            let start = simd.mul(simd.load(&along_x[axis]), x);
+            let moved = simd.mul_add(simd.load(&along_y[axis]), y, start);
+            *at = simd.store(simd.add(moved, simd.load(&origin[axis])));
+        }
+    }
+
+    /// The views' places in the reference's list, one a lane.
+    #[inline(always)]
+    pub fn sources(&self) -> &[usize] {
+        &self.sources[..self.count]
+    }
+
+    /// Where the pixel falls at this depth.
+    #[inline(always)]
+    pub fn place<S: Simd>(&self, simd: S, depth: f32) -> Placed {
+        let (zero, inverse_depth) = (simd.splat(0.0), simd.splat(1.0 / depth));
+        let x = self.coordinate(simd, 0, inverse_depth);
+        let y = self.coordinate(simd, 1, inverse_depth);
+        let z = self.coordinate(simd, 2, inverse_depth);
+        let inverse_z = simd.div(simd.splat(1.0), z);
+        let (column, row) = (simd.mul(x, inverse_z), simd.mul(y, inverse_z));
+        let [right, bottom] = [simd.load(&self.corner[0]), simd.load(&self.corner[1])];
+        let (to_right, to_bottom) = (simd.sub(right, column), simd.sub(bottom, row));
+        let margin = simd.min(simd.min(column, row), simd.min(to_right, to_bottom));
+        let in_front = simd.at_least(z, simd.splat(f32::MIN_POSITIVE));
+        Placed {
+            centre: [simd.store(x), simd.store(y), simd.store(z)],
+            // `max` last: it gives 0 for what is not a number, and for the -1 of lanes without a view.
+            column: simd.store(simd.max(simd.min(column, right), zero)),
+            row: simd.store(simd.max(simd.min(row, bottom), zero)),
+            inside: simd.at_least(margin, zero) & in_front,
+        }
+    }
+
     /// A homogeneous coordinate of the pixel's point at an inverse depth. A function, no closure: what is not inlined is
     /// not compiled for the instruction set.
     #[inline(always)]
@@ -134,10 +184,27 @@ impl Group {
         let (epipole, origin) = (simd.load(&self.epipole[axis]), simd.load(&self.at_infinity[axis]));
         simd.mul_add(epipole, inverse_depth, origin)
     }
+
+    /// What the plane's homographies do to a step along x and along y: [`PatchHomography`] of all views.
+    #[inline(always)]
+    pub fn slopes<S: Simd>(&self, simd: S, plane: &SlantedPlane) -> [[Lanes; 3]; 2] {
+        let (slope_x, slope_y) = (simd.splat(plane.slope_x), simd.splat(plane.slope_y));
+        let [along_x, along_y, _] = &self.infinite;
+        let mut slopes = [[[0.0; LANES]; 3]; 2];
+        for (axis, epipole) in self.epipole.iter().enumerate() {
+            let epipole = simd.load(epipole);
+            slopes[0][axis] = simd.store(simd.mul_add(epipole, slope_x, simd.load(&along_x[axis])));
+            slopes[1][axis] = simd.store(simd.mul_add(epipole, slope_y, simd.load(&along_y[axis])));
+        }
+        slopes
+    }
 }
 
-/// The bits of the eight sources of a group.
-#[inline(always)]
-fn byte_of(set: &[u32], group: usize) -> u8 {
-    set.get(group / 4).map_or(0, |word| (word >> (group % 4 * LANES)) as u8)
+impl Placed {
+    /// The homography of a lane's view.
+    #[inline(always)]
+    pub fn homography(&self, [along_x, along_y]: &[[Lanes; 3]; 2], lane: usize) -> PatchHomography {
+        let of = |lanes: &[Lanes; 3]| Vec3::new(lanes[0][lane], lanes[1][lane], lanes[2][lane]);
+        PatchHomography { centre: of(&self.centre), along_x: of(along_x), along_y: of(along_y) }
+    }
 }

@@ -68,6 +68,11 @@ impl ViewSets {
         words[source / 32] |= 1 << (source % 32);
     }
 
+    #[inline(always)]
+    pub(crate) fn holds(words: &[u32], source: usize) -> bool {
+        words[source / 32] >> (source % 32) & 1 != 0
+    }
+
     pub(crate) fn fill_words(words: &mut [u32], sources: usize) {
         for (index, word) in words.iter_mut().enumerate() {
             let bits = sources.saturating_sub(index * 32).min(32);

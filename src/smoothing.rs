@@ -1,0 +1,163 @@
+//! Smoothing, beyond the paper: each validated plane is averaged with the validated planes around it that continue the
+//! same surface. Windows of neighbouring pixels share samples but not their errors of search, which average out.
+
+use crate::ambc::MIN_FACING;
+use crate::camera::Camera;
+use crate::image::PackedImage;
+use crate::kernels::SlantedPlane;
+use crate::scene::DepthRange;
+use crate::state::Solution;
+use glam::{DVec2, Vec3};
+use rayon::prelude::*;
+
+/// Half side of the neighbourhood and distance between the neighbours that are looked at, in pixels.
+const RADIUS: usize = 4;
+const STEP: usize = 2;
+/// Relative difference of inverse depth at which a neighbour's plane counts for 1 / sqrt(e).
+const DEPTH_SIGMA: f32 = 0.004;
+/// `1 - cos` of the angle between normals at which it counts for 1 / e: 30 degrees.
+const NORMAL_SCALE: f32 = 0.134;
+/// Difference of grey values at which it counts for 1 / sqrt(e).
+const GREY_SIGMA: f32 = 10.0;
+/// Distance in pixels at which it counts for 1 / sqrt(e).
+const SPATIAL_SIGMA: f32 = 2.7;
+
+/// A map with a border of [`RADIUS`] zeros.
+struct Padded {
+    stride: usize,
+    values: Vec<f32>,
+}
+
+impl Padded {
+    fn new(width: usize, height: usize, value: impl Fn(usize) -> f32) -> Padded {
+        let stride = width + 2 * RADIUS;
+        let mut values = vec![0.0; stride * (height + 2 * RADIUS)];
+        for (y, row) in values[RADIUS * stride..].chunks_exact_mut(stride).take(height).enumerate() {
+            for (x, place) in row[RADIUS..][..width].iter_mut().enumerate() {
+                *place = value(y * width + x);
+            }
+        }
+        Padded { stride, values }
+    }
+
+    /// The row `y + dy`, from `dx` on.
+    fn row(&self, y: usize, (dx, dy): (i32, i32), width: usize) -> &[f32] {
+        let row = (y + RADIUS).wrapping_add_signed(dy as isize);
+        &self.values[row * self.stride + RADIUS.wrapping_add_signed(dx as isize)..][..width]
+    }
+}
+
+/// What the neighbours are asked for; planes as inverse depth, 0 where nothing is validated.
+struct Surface {
+    inverse_depth: Padded,
+    slope: [Padded; 2],
+    normal: [Padded; 3],
+    grey: Padded,
+}
+
+/// The weighted sums of a row.
+struct Sums {
+    weight: Vec<f32>,
+    inverse_depth: Vec<f32>,
+    normal: [Vec<f32>; 3],
+}
+
+/// Smooths the validated solutions of a view; planes that would leave the depth range or turn away stay.
+pub fn smooth(camera: &Camera, image: &PackedImage, range: DepthRange, solutions: &mut [Solution]) {
+    let (width, height) = (image.width, image.height);
+    let inverse_focal = ((1.0 / camera.fx) as f32, (1.0 / camera.fy) as f32);
+    let ray = |x: usize, y: usize| camera.ray(DVec2::new(x as f64, y as f64)).as_vec3();
+    let surface = {
+        let plane = |pixel: usize| {
+            let solution = &solutions[pixel];
+            let none = SlantedPlane { inverse_depth: 0.0, slope_x: 0.0, slope_y: 0.0 };
+            if !solution.validated {
+                return none;
+            }
+            SlantedPlane::new(
+                solution.depth,
+                solution.normal,
+                ray(pixel % width, pixel / width),
+                inverse_focal,
+            )
+        };
+        let planes: Vec<SlantedPlane> = (0..solutions.len()).into_par_iter().map(plane).collect();
+        Surface {
+            inverse_depth: Padded::new(width, height, |pixel| planes[pixel].inverse_depth),
+            slope: [
+                Padded::new(width, height, |pixel| planes[pixel].slope_x),
+                Padded::new(width, height, |pixel| planes[pixel].slope_y),
+            ],
+            normal: std::array::from_fn(|axis| {
+                Padded::new(width, height, |pixel| solutions[pixel].normal[axis])
+            }),
+            grey: Padded::new(width, height, |pixel| f32::from(image.grey(pixel % width, pixel / width))),
+        }
+    };
+    solutions.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+        let sums = surface.sum_row(y, width);
+        for (x, solution) in row.iter_mut().enumerate().filter(|(_, solution)| solution.validated) {
+            let depth = sums.weight[x] / sums.inverse_depth[x];
+            let normal = Vec3::from_array(std::array::from_fn(|axis| sums.normal[axis][x]));
+            let normal = normal.normalize_or_zero();
+            let in_range = depth >= range.near as f32 && depth <= range.far as f32;
+            if in_range && normal.dot(ray(x, y)) < -MIN_FACING {
+                (solution.depth, solution.normal) = (depth, normal);
+            }
+        }
+    });
+}
+
+impl Surface {
+    fn sum_row(&self, y: usize, width: usize) -> Sums {
+        let zeros = || vec![0.0; width];
+        let mut sums =
+            Sums { weight: zeros(), inverse_depth: zeros(), normal: std::array::from_fn(|_| zeros()) };
+        let radius = RADIUS as i32;
+        for dy in (-radius..=radius).step_by(STEP) {
+            for dx in (-radius..=radius).step_by(STEP) {
+                if dx * dx + dy * dy <= radius * radius + 1 {
+                    self.add(&mut sums, y, (dx, dy));
+                }
+            }
+        }
+        sums
+    }
+
+    /// Adds what the neighbours at an offset say to the sums of a row.
+    fn add(&self, sums: &mut Sums, y: usize, offset: (i32, i32)) {
+        let width = sums.weight.len();
+        let centre = self.inverse_depth.row(y, (0, 0), width);
+        let [cx, cy, cz] = [0, 1, 2].map(|axis| self.normal[axis].row(y, (0, 0), width));
+        let grey = self.grey.row(y, (0, 0), width);
+        let inverse_depth = self.inverse_depth.row(y, offset, width);
+        let [slope_x, slope_y] = [0, 1].map(|axis| self.slope[axis].row(y, offset, width));
+        let [nx, ny, nz] = [0, 1, 2].map(|axis| self.normal[axis].row(y, offset, width));
+        let other_grey = self.grey.row(y, offset, width);
+        let (dx, dy) = (offset.0 as f32, offset.1 as f32);
+        let far = (dx * dx + dy * dy) / (2.0 * SPATIAL_SIGMA * SPATIAL_SIGMA);
+        let [sum_x, sum_y, sum_z] = &mut sums.normal;
+        let (weights, depths) = (&mut sums.weight[..width], &mut sums.inverse_depth[..width]);
+        let (sum_x, sum_y, sum_z) = (&mut sum_x[..width], &mut sum_y[..width], &mut sum_z[..width]);
+        for x in 0..width {
+            let predicted = inverse_depth[x] - slope_x[x] * dx - slope_y[x] * dy;
+            // Where there is no own plane the sums are not looked at.
+            let depth = (predicted - centre[x]) / (centre[x] * DEPTH_SIGMA);
+            let normal = (1.0 - (nx[x] * cx[x] + ny[x] * cy[x] + nz[x] * cz[x])) * (1.0 / NORMAL_SCALE);
+            let colour = (other_grey[x] - grey[x]) * (1.0 / GREY_SIGMA);
+            let exponent = 0.5 * (depth * depth + colour * colour) + normal + far;
+            // exp, near enough, and 0 from 8 on.
+            let root = 1.0 - exponent * 0.125;
+            let root = if root > 0.0 { root } else { 0.0 };
+            let root = if inverse_depth[x] > 0.0 { root } else { 0.0 };
+            let square = root * root;
+            let fourth = square * square;
+            let weight = fourth * fourth;
+            weights[x] += weight;
+            depths[x] += weight * predicted;
+            sum_x[x] += weight * nx[x];
+            sum_y[x] += weight * ny[x];
+            sum_z[x] += weight * nz[x];
+        }
+    }
+}
