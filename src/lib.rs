@@ -8,6 +8,7 @@ pub mod camera;
 #[cfg(feature = "capi")]
 mod capi;
 mod consistency;
+mod edges;
 mod error;
 mod filling;
 pub mod fusion;

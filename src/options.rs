@@ -104,6 +104,9 @@ pub struct Options {
     /// Angle between normals that contradicts altogether, in degrees.
     pub smoothness_normal: f64,
 
+    /// How often validated pixels that look more like a surface behind theirs are given to that one, after every check;
+    /// 0 for never (`paper`).
+    pub edge_passes: u32,
     /// How often the validated planes are averaged with those around them that continue the same surface, after every
     /// check; 0 for never (`paper`).
     pub smoothing_passes: u32,
@@ -192,6 +195,7 @@ impl Options {
             smoothness: 0.0,
             smoothness_depth: 0.01,
             smoothness_normal: 40.0,
+            edge_passes: 0,
             smoothing_passes: 0,
             view_selection: true,
             triangulation_angle: (10.0, 30.0),
@@ -322,6 +326,7 @@ impl Default for Options {
             restart_spread: 0.01,
             restart_tilt: 0.3,
             smoothness: 0.1,
+            edge_passes: 2,
             smoothing_passes: 1,
             triangulation_angle: (4.0, 40.0),
             max_sources: 16,

@@ -99,7 +99,8 @@ fn facing(normal: DVec3, ray: DVec3) -> DVec3 {
     if away <= 0.0 { normal } else { (normal - ray * (away / ray.length_squared())).normalize() }
 }
 
-fn surface(camera: &Camera, solutions: &[Solution]) -> Vec<SlantedPlane> {
+/// The validated solutions as planes, inverse depth 0 elsewhere.
+pub fn surface(camera: &Camera, solutions: &[Solution]) -> Vec<SlantedPlane> {
     let width = camera.width as usize;
     let inverse_focal = ((1.0 / camera.fx) as f32, (1.0 / camera.fy) as f32);
     let plane = |(pixel, solution): (usize, &Solution)| {

@@ -84,6 +84,7 @@ pub(super) const TABLE: &[Entry] = &[
     entry!(number c"smoothness", 0.0, 1e3, smoothness),
     entry!(number c"smoothness_depth", 1e-6, 1.0, smoothness_depth),
     entry!(number c"smoothness_normal", 1e-3, 180.0, smoothness_normal),
+    entry!(whole c"edge_passes", 0, 100, edge_passes as u32),
     entry!(whole c"smoothing_passes", 0, 100, smoothing_passes as u32),
     entry!(switch c"view_selection", view_selection),
     entry!(number c"triangulation_angle.min", 0.0, 180.0, triangulation_angle.0),

@@ -4,6 +4,7 @@ use super::prepare::Steps;
 use super::state::State;
 use crate::ambc::{BAND_ROWS, CostRules, FoodSource, Offer, Search, stream};
 use crate::consistency::{self, ConsistencyRules};
+use crate::edges::trim;
 use crate::error::{Error, Result};
 use crate::filling::fill;
 use crate::image::ScaledView;
@@ -220,6 +221,7 @@ impl Steps {
         }
         let ScaledView { camera, image, range, .. } = self.scaled(state.step(), view);
         state.solved.judge(&verdicts.0);
+        trim(camera, image, *range, &mut state.solved.solutions, self.options.edge_passes);
         for _ in 0..self.options.smoothing_passes {
             smooth(camera, image, *range, &mut state.solved.solutions);
         }

@@ -1,0 +1,157 @@
+//! Edges of surfaces, beyond the paper: a window at the edge of a near surface matches by that surface's texture even
+//! where its centre already lies on what is behind, so that near surfaces come out too wide. The grey values tell which
+//! of the two a pixel belongs to.
+
+use crate::ambc::MIN_FACING;
+use crate::camera::Camera;
+use crate::image::PackedImage;
+use crate::kernels::SlantedPlane;
+use crate::scene::DepthRange;
+use crate::state::{Solution, surface};
+use glam::{DVec2, Vec3};
+use rayon::prelude::*;
+
+/// Half side of the neighbourhood, in pixels: more than that surfaces are hardly widened.
+const RADIUS: i32 = 6;
+/// Difference of grey values at which a neighbour counts for 1 / sqrt(e).
+const GREY_SIGMA: f32 = 6.0;
+/// Distance in pixels at which it counts for 1 / sqrt(e).
+const SPATIAL_SIGMA: f32 = 4.0;
+/// Relative difference of inverse depths up to which a neighbour lies on the pixel's surface, and from which on it lies
+/// on one behind.
+const SAME: f32 = 0.01;
+const BEHIND: f32 = 0.02;
+/// Empty pixels must outweigh the pixel's surface by this factor: they may be gaps in it.
+const EMPTY_FACTOR: f32 = 2.0;
+
+/// Neighbours that show whether there is an edge nearby.
+const PROBES: [(i32, i32); 12] =
+    [(3, 0), (-3, 0), (0, 3), (0, -3), (6, 0), (-6, 0), (0, 6), (0, -6), (4, 4), (-4, 4), (4, -4), (-4, -4)];
+
+/// How much neighbours count.
+struct Weights {
+    offsets: Vec<((i32, i32), f32)>,
+    by_grey: [f32; 256],
+}
+
+impl Weights {
+    fn new() -> Weights {
+        let gaussian = |value: f32, sigma: f32| (-value * value / (2.0 * sigma * sigma)).exp();
+        let offsets = (-RADIUS..=RADIUS).flat_map(|dy| (-RADIUS..=RADIUS).map(move |dx| (dx, dy)));
+        let near = |&(dx, dy): &(i32, i32)| dx * dx + dy * dy <= RADIUS * RADIUS + 1 && (dx, dy) != (0, 0);
+        let weigh =
+            |(dx, dy): (i32, i32)| ((dx, dy), gaussian(((dx * dx + dy * dy) as f32).sqrt(), SPATIAL_SIGMA));
+        Weights {
+            offsets: offsets.filter(near).map(weigh).collect(),
+            by_grey: std::array::from_fn(|difference| gaussian(difference as f32, GREY_SIGMA)),
+        }
+    }
+}
+
+/// What becomes of a validated pixel.
+enum Belongs {
+    /// To its own surface.
+    ToItsOwn,
+    /// To the one behind.
+    Behind { depth: f32, normal: Vec3 },
+    /// To none that is known.
+    Nowhere,
+}
+
+/// Gives the validated pixels that look more like a surface behind to that one, in so many passes, each of which moves
+/// edges by a few pixels at most.
+pub fn trim(
+    camera: &Camera,
+    image: &PackedImage,
+    range: DepthRange,
+    solutions: &mut [Solution],
+    passes: u32,
+) {
+    let weights = Weights::new();
+    for _ in 0..passes {
+        let planes = surface(camera, solutions);
+        let edges = Edges { camera, image, range, planes: &planes, before: solutions, weights: &weights };
+        let width = image.width;
+        let trimmed: Vec<Solution> = (0..solutions.len())
+            .into_par_iter()
+            .with_min_len(width)
+            .map(|pixel| {
+                let solution = edges.before[pixel];
+                if !solution.validated {
+                    return solution;
+                }
+                match edges.judge((pixel % width, pixel / width)) {
+                    Belongs::ToItsOwn => solution,
+                    Belongs::Behind { depth, normal } => Solution { depth, normal, ..solution },
+                    Belongs::Nowhere => Solution { validated: false, ..solution },
+                }
+            })
+            .collect();
+        solutions.copy_from_slice(&trimmed);
+    }
+}
+
+struct Edges<'a> {
+    camera: &'a Camera,
+    image: &'a PackedImage,
+    range: DepthRange,
+    planes: &'a [SlantedPlane],
+    before: &'a [Solution],
+    weights: &'a Weights,
+}
+
+impl Edges<'_> {
+    /// The pixel at an offset, `None` outside the image.
+    fn neighbour(&self, (x, y): (usize, usize), (dx, dy): (i32, i32)) -> Option<usize> {
+        let (column, row) = (x.wrapping_add_signed(dx as isize), y.wrapping_add_signed(dy as isize));
+        (column < self.image.width && row < self.image.height).then(|| row * self.image.width + column)
+    }
+
+    /// Relative difference to a pixel's inverse depth of what the plane of its neighbour at an offset has there; `None`
+    /// without one.
+    fn difference(&self, own: f32, neighbour: usize, (dx, dy): (i32, i32)) -> Option<f32> {
+        let plane = &self.planes[neighbour];
+        let there = plane.inverse_depth_at(-dx as f32, -dy as f32);
+        (plane.inverse_depth > 0.0).then_some(there / own - 1.0)
+    }
+
+    fn judge(&self, at: (usize, usize)) -> Belongs {
+        let pixel = at.1 * self.image.width + at.0;
+        let own = self.planes[pixel].inverse_depth;
+        let is_edge = |&offset: &(i32, i32)| {
+            let neighbour = self.neighbour(at, offset);
+            neighbour
+                .is_some_and(|other| self.difference(own, other, offset).is_none_or(|d| d.abs() > BEHIND))
+        };
+        if !PROBES.iter().any(is_edge) {
+            return Belongs::ToItsOwn;
+        }
+        let grey = self.image.grey(at.0, at.1);
+        let (mut same, mut behind, mut empty) = (1.0, 0.0, 0.0);
+        let (mut inverse_depth, mut normal) = (0.0, Vec3::ZERO);
+        for &(offset, weight) in &self.weights.offsets {
+            let Some(other) = self.neighbour(at, offset) else { continue };
+            let other_grey = self.image.grey(other % self.image.width, other / self.image.width);
+            let weight = weight * self.weights.by_grey[usize::from(grey.abs_diff(other_grey))];
+            match self.difference(own, other, offset) {
+                None => empty += weight,
+                Some(difference) if difference.abs() < SAME => same += weight,
+                Some(difference) if difference < -BEHIND => {
+                    behind += weight;
+                    inverse_depth += weight * own * (1.0 + difference);
+                    normal += weight * self.before[other].normal;
+                }
+                Some(_) => {}
+            }
+        }
+        if behind > same {
+            let (depth, normal) = (behind / inverse_depth, normal.normalize_or_zero());
+            let ray = self.camera.ray(DVec2::new(at.0 as f64, at.1 as f64)).as_vec3();
+            let in_range = depth >= self.range.near as f32 && depth <= self.range.far as f32;
+            if in_range && normal.dot(ray) < -MIN_FACING {
+                return Belongs::Behind { depth, normal };
+            }
+        }
+        if empty > EMPTY_FACTOR * same { Belongs::Nowhere } else { Belongs::ToItsOwn }
+    }
+}
