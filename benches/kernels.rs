@@ -130,7 +130,7 @@ impl Task for CompareViews<'_> {
                         let Source { image, pose, .. } = &sources[index];
                         (image, pose.homography(pose.at_infinity(x as f32, y as f32), plane))
                     };
-                    sum += patch_costs(simd, window, &patch, view, sources.len())[0];
+                    sum += patch_costs(simd, window, &patch, view, 0b1111)[0];
                 }
                 sum
             },

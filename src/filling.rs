@@ -169,3 +169,169 @@ fn on_plane(reference: &Reference, plane: DVec3, (x, y): (usize, usize)) -> Opti
         && normal.dot(reference.ray(x as f32, y as f32)) < -MIN_FACING;
     is_usable.then(|| FoodSource { validated: true, ..FoodSource::new(depth, normal) })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{self, World};
+
+    const SIZE: (u32, u32) = (60, 48);
+    const WIDTH: usize = SIZE.0 as usize;
+    const PIXELS: usize = WIDTH * SIZE.1 as usize;
+
+    /// The wall seen by one camera; the pixels of a hole have wrong planes that are not validated.
+    struct Holed {
+        world: World,
+        planes: Vec<FoodSource>,
+        weak: Vec<bool>,
+    }
+
+    fn holed(is_hole: impl Fn(i32, i32) -> bool) -> Holed {
+        let world = World::new(&[0.0], SIZE);
+        let weak: Vec<bool> = (0..PIXELS).map(|pixel| is_hole(column(pixel), row(pixel))).collect();
+        let plane = |pixel: usize| match weak[pixel] {
+            true => FoodSource { cost: 2.0, ..FoodSource::new(3.0, Vec3::NEG_Z) },
+            false => FoodSource { validated: true, cost: 0.1, ..exact(&world, pixel) },
+        };
+        Holed { planes: (0..PIXELS).map(plane).collect(), world, weak }
+    }
+
+    fn exact(world: &World, pixel: usize) -> FoodSource {
+        FoodSource::new(testing::depth(&world.cameras[0], pixel), testing::normal(&world.cameras[0]))
+    }
+
+    fn column(pixel: usize) -> i32 {
+        (pixel % WIDTH) as i32
+    }
+
+    fn row(pixel: usize) -> i32 {
+        (pixel / WIDTH) as i32
+    }
+
+    fn is_in_disc(x: i32, y: i32) -> bool {
+        (x - 30).pow(2) + (y - 24).pow(2) <= 100
+    }
+
+    impl Holed {
+        /// Fills, and checks that what is not filled is as it was.
+        fn fill(&mut self) -> Vec<usize> {
+            let before = self.planes.clone();
+            let mut filled = fill(&self.world.reference(), &mut self.planes, &self.weak);
+            filled.sort_unstable();
+            for (pixel, before) in before.iter().enumerate() {
+                assert_eq!(self.planes[pixel].cost, before.cost, "filling does not match");
+                match filled.binary_search(&pixel) {
+                    Ok(_) => assert!(self.weak[pixel] && !before.validated && before.depth > 0.0),
+                    Err(_) => assert_eq!(self.planes[pixel], *before),
+                }
+            }
+            filled
+        }
+
+        fn hole(&self) -> Vec<usize> {
+            (0..PIXELS).filter(|&pixel| self.weak[pixel]).collect()
+        }
+
+        fn assert_on_the_wall(&self, pixels: &[usize]) {
+            for &pixel in pixels {
+                let (found, exact) = (&self.planes[pixel], exact(&self.world, pixel));
+                assert!(found.validated);
+                assert!((found.depth / exact.depth - 1.0).abs() < 1e-4, "{found:?} instead of {exact:?}");
+                let sine = found.normal.cross(exact.normal).length();
+                assert!(sine < 0.1f32.to_radians().sin(), "{found:?} instead of {exact:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_hole_is_filled_with_the_plane_around_it() {
+        let mut holed = holed(is_in_disc);
+        let filled = holed.fill();
+        assert_eq!(filled, holed.hole());
+        holed.assert_on_the_wall(&filled);
+    }
+
+    #[test]
+    fn each_part_is_filled_by_itself() {
+        let mut holed =
+            holed(|x, y| (x - 15).pow(2) + (y - 24).pow(2) <= 60 || (41..52).contains(&x) && y > 30);
+        for pixel in (0..PIXELS).filter(|&pixel| column(pixel) > 30) {
+            holed.planes[pixel].depth *= 1.3;
+        }
+        let filled = holed.fill();
+        assert_eq!(filled, holed.hole());
+        let left: Vec<usize> = filled.iter().copied().filter(|&pixel| column(pixel) < 30).collect();
+        holed.assert_on_the_wall(&left);
+        let mut right: Vec<usize> = filled.into_iter().filter(|&pixel| column(pixel) > 30).collect();
+        right.retain(|&pixel| {
+            (holed.planes[pixel].depth / exact(&holed.world, pixel).depth - 1.3).abs() > 1e-3
+        });
+        assert_eq!(right, []);
+    }
+
+    #[test]
+    fn something_before_a_third_of_the_rim_does_not_spoil_it() {
+        let mut holed = holed(is_in_disc);
+        for pixel in 0..PIXELS {
+            let (x, y) = (f64::from(column(pixel) - 30), f64::from(row(pixel) - 24));
+            if !holed.weak[pixel] && x > 0.5 * x.hypot(y) {
+                holed.planes[pixel].depth *= 0.8;
+            }
+        }
+        let filled = holed.fill();
+        assert_eq!(filled, holed.hole());
+        holed.assert_on_the_wall(&filled);
+    }
+
+    #[test]
+    fn a_hole_at_the_border_is_filled_unless_it_is_framed_too_little() {
+        let mut shallow = holed(|_, y| y >= 40);
+        let filled = shallow.fill();
+        assert_eq!(filled, shallow.hole());
+        shallow.assert_on_the_wall(&filled);
+        assert_eq!(holed(|_, y| y >= 12).fill(), []);
+        assert_eq!(holed(|_, _| true).fill(), [], "nothing is around it");
+    }
+
+    #[test]
+    fn a_hole_whose_rim_lies_on_no_common_plane_stays() {
+        let mut holed = holed(is_in_disc);
+        for pixel in (0..PIXELS).filter(|&pixel| !is_in_disc(column(pixel), row(pixel))) {
+            let (x, y) = ((column(pixel) - 30) as f32, (row(pixel) - 24) as f32);
+            holed.planes[pixel].depth *= 1.0 + 0.05 * (4.0 * y.atan2(x)).sin();
+        }
+        assert_eq!(holed.fill(), []);
+    }
+
+    #[test]
+    fn pixels_that_can_be_matched_are_validated_or_masked_stay() {
+        let mut holed = holed(is_in_disc);
+        let hole = holed.hole();
+        let at = |x: usize, y: usize| y * WIDTH + x;
+        // Not validated, but matched; validated, but weak; left out by a mask.
+        let (matched, validated, masked) = (at(30, 24), at(27, 22), at(33, 26));
+        holed.weak[matched] = false;
+        holed.planes[validated] = FoodSource { validated: true, ..exact(&holed.world, validated) };
+        holed.planes[masked] = FoodSource::new(0.0, Vec3::ZERO);
+        let filled = holed.fill();
+        let rest = hole.into_iter().filter(|pixel| ![matched, validated, masked].contains(pixel));
+        assert_eq!(filled, rest.collect::<Vec<_>>());
+        holed.assert_on_the_wall(&filled);
+        holed.weak.fill(false);
+        filled.iter().for_each(|&pixel| holed.planes[pixel].validated = false);
+        assert_eq!(holed.fill(), []);
+    }
+
+    #[test]
+    fn a_pixel_whose_plane_leaves_the_depth_range_stays() {
+        let mut holed = holed(is_in_disc);
+        let depths = holed.hole().into_iter().map(|pixel| exact(&holed.world, pixel).depth);
+        let far = depths.clone().fold(0.0, f32::max) - 0.1;
+        let count = depths.filter(|&depth| depth <= far).count();
+        let mut reference = holed.world.reference();
+        reference.far = far;
+        let filled = fill(&reference, &mut holed.planes, &holed.weak);
+        assert!(filled.len() < holed.hole().len() && filled.len().abs_diff(count) <= 1);
+        assert!(filled.iter().all(|&pixel| holed.planes[pixel].depth <= far));
+    }
+}

@@ -161,3 +161,150 @@ impl Surface {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ambc::Random;
+    use crate::image::Picture;
+    use crate::testing::{self, RANGE};
+
+    const SIZE: (u32, u32) = (44, 36);
+
+    fn camera() -> Camera {
+        testing::camera(0.0, SIZE)
+    }
+
+    /// The wall, validated everywhere.
+    fn wall() -> Vec<Solution> {
+        let validated = |solution: Solution| Solution { validated: true, ..solution };
+        testing::exact(&camera()).solutions.into_iter().map(validated).collect()
+    }
+
+    fn smooth_grey(range: DepthRange, solutions: &mut [Solution]) {
+        let grey = vec![100; solutions.len()];
+        let image = PackedImage::new(&Picture::from_grey(SIZE.0, SIZE.1, grey).unwrap());
+        smooth(&camera(), &image, range, solutions);
+    }
+
+    fn ray(pixel: usize) -> Vec3 {
+        let camera = camera();
+        camera.ray(testing::place(&camera, pixel)).as_vec3()
+    }
+
+    fn signed(random: &mut Random) -> Vec3 {
+        Vec3::new(random.signed(), random.signed(), random.signed())
+    }
+
+    fn assert_same_planes(solutions: &[Solution], expected: &[Solution]) {
+        for (solution, expected) in solutions.iter().zip(expected) {
+            assert!((solution.depth / expected.depth - 1.0).abs() < 1e-5, "{solution:?}, {expected:?}");
+            assert!((solution.normal - expected.normal).length() < 1e-5, "{solution:?}, {expected:?}");
+        }
+    }
+
+    /// Root mean square errors of the depth, relative, and of the normal.
+    fn errors(solutions: &[Solution], truth: &[Solution]) -> (f32, f32) {
+        let (mut depth, mut normal) = (0.0, 0.0);
+        for (solution, truth) in solutions.iter().zip(truth) {
+            depth += (solution.depth / truth.depth - 1.0).powi(2);
+            normal += (solution.normal - truth.normal).length_squared();
+        }
+        ((depth / truth.len() as f32).sqrt(), (normal / truth.len() as f32).sqrt())
+    }
+
+    #[test]
+    fn an_exact_plane_stays() {
+        let mut solutions = wall();
+        smooth_grey(RANGE, &mut solutions);
+        assert_same_planes(&solutions, &wall());
+    }
+
+    #[test]
+    fn errors_of_depth_and_normal_average_out() {
+        let truth = wall();
+        let mut solutions = truth.clone();
+        for (pixel, solution) in solutions.iter_mut().enumerate() {
+            let mut random = Random::new(3, pixel as u64);
+            solution.depth *= 1.0 + 0.003 * random.signed();
+            solution.normal = (solution.normal + 0.05 * signed(&mut random)).normalize();
+        }
+        let before = errors(&solutions, &truth);
+        smooth_grey(RANGE, &mut solutions);
+        let after = errors(&solutions, &truth);
+        assert!(after.0 < 0.5 * before.0, "depths off by {} and before by {}", after.0, before.0);
+        assert!(after.1 < 0.5 * before.1, "normals off by {} and before by {}", after.1, before.1);
+    }
+
+    #[test]
+    fn surfaces_before_each_other_do_not_mix() {
+        let mut truth = wall();
+        for (pixel, solution) in truth.iter_mut().enumerate() {
+            if testing::place(&camera(), pixel).x > 20.0 {
+                solution.depth *= 1.03;
+            }
+        }
+        let mut solutions = truth.clone();
+        smooth_grey(RANGE, &mut solutions);
+        assert_same_planes(&solutions, &truth);
+    }
+
+    #[test]
+    fn neighbours_of_another_grey_value_do_not_count() {
+        let mut solutions = wall();
+        let is_right = |pixel: usize| testing::place(&camera(), pixel).x > 20.0;
+        for (pixel, solution) in solutions.iter_mut().enumerate() {
+            // Near enough to be taken for the same surface.
+            solution.depth *= if is_right(pixel) { 1.002 } else { 1.0 };
+        }
+        let before = solutions.clone();
+        let greys = (0..solutions.len()).map(|pixel| if is_right(pixel) { 160 } else { 100 }).collect();
+        let image = PackedImage::new(&Picture::from_grey(SIZE.0, SIZE.1, greys).unwrap());
+        smooth(&camera(), &image, RANGE, &mut solutions);
+        assert_same_planes(&solutions, &before);
+        smooth_grey(RANGE, &mut solutions);
+        assert!(errors(&solutions, &before).0 > 1e-4, "where they look alike they do");
+    }
+
+    #[test]
+    fn what_is_not_validated_stays_and_has_no_say() {
+        let mut solutions = wall();
+        for (pixel, solution) in solutions.iter_mut().enumerate().filter(|(pixel, _)| pixel % 3 == 0) {
+            solution.validated = false;
+            solution.depth *= if pixel % 2 == 0 { 1.001 } else { 0.0 };
+        }
+        let before = solutions.clone();
+        smooth_grey(RANGE, &mut solutions);
+        for (solution, before) in solutions.iter().zip(&before).filter(|(_, before)| !before.validated) {
+            assert_eq!((solution.depth, solution.normal), (before.depth, before.normal));
+        }
+        let validated =
+            |solutions: &[Solution]| solutions.iter().copied().filter(|s| s.validated).collect::<Vec<_>>();
+        assert_same_planes(&validated(&solutions), &validated(&before));
+    }
+
+    #[test]
+    fn no_plane_leaves_the_depth_range_or_turns_away() {
+        let range = DepthRange { near: 4.99, far: 5.01 };
+        let mut moved = 0;
+        for tilt in [0.1, 1.0, 3.0] {
+            let mut solutions = wall();
+            for (pixel, solution) in solutions.iter_mut().enumerate() {
+                let mut random = Random::new(4, pixel as u64);
+                solution.depth = 5.0 + 0.0099 * random.signed();
+                let steep = ray(pixel).cross(Vec3::Y).normalize() - 0.03 * ray(pixel).normalize();
+                let normal = (steep + tilt * signed(&mut random)).normalize();
+                let is_facing = normal.dot(ray(pixel)) < -MIN_FACING;
+                solution.normal = if is_facing { normal } else { steep.normalize() };
+            }
+            let before = solutions.clone();
+            smooth_grey(range, &mut solutions);
+            for (pixel, solution) in solutions.iter().enumerate() {
+                assert!((range.near as f32..=range.far as f32).contains(&solution.depth), "{solution:?}");
+                assert!(solution.normal.is_normalized() && solution.normal.dot(ray(pixel)) < -MIN_FACING);
+                moved += usize::from(solution.depth != before[pixel].depth);
+            }
+        }
+        assert!(moved > 1000, "{moved} planes moved");
+    }
+}

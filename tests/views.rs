@@ -6,10 +6,10 @@ use common::procedural::looking_at;
 use glam::{DVec3, Vec3};
 use skep::camera::Camera;
 use skep::image::{PackedImage, Picture};
-use skep::kernels::SlantedPlane;
-use skep::simd::{Level, Simd, Task, dispatch};
+use skep::kernels::{PatchHomography, SlantedPlane};
+use skep::simd::{LANES, Level, Simd, Task, dispatch};
 use skep::views::{
-    Placement, Placements, Reference, Source, SourceLists, ViewRules, ViewSets, faces_source, is_occluded,
+    Placed, Placements, Reference, Source, SourceLists, ViewRules, ViewSets, faces_source, is_occluded,
     source_lists,
 };
 use skep::{DepthRange, Options, Scene, SparsePoint, View};
@@ -302,22 +302,62 @@ fn at_most_so_many_sources_are_taken() {
     assert_eq!(list(1).len(), 1);
 }
 
-/// Where the points of a pixel at these depths fall in the sources of a set.
-struct Place<'a>(&'a Reference<'a>, (f32, f32), &'a [u32], &'a [f32]);
+/// Where a hypothesis falls in a source view that has it in its image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Placement {
+    source: usize,
+    homography: PatchHomography,
+    x: f32,
+    y: f32,
+}
+
+/// Where the planes of a pixel fall in the sources of a set, which is taken on the way to the pixel or afterwards.
+struct Place<'a> {
+    reference: &'a Reference<'a>,
+    pixel: (f32, f32),
+    set: &'a [u32],
+    planes: &'a [SlantedPlane],
+    afterwards: bool,
+}
 
 impl Task for Place<'_> {
     type Output = Vec<Vec<Placement>>;
 
     fn run<S: Simd>(self, simd: S) -> Self::Output {
-        let Place(reference, (x, y), set, depths) = self;
+        let Place { reference, pixel: (x, y), set, planes, afterwards } = self;
         let mut placements = Placements::new(simd, reference);
-        placements.go_to(x, y, set);
-        let place = |&depth: &f32| {
+        placements.go_to(x, y, if afterwards { &[0x3ff] } else { set });
+        if afterwards {
+            placements.keep(set);
+        }
+        let place = |plane: &SlantedPlane| {
             let mut found = Vec::new();
-            placements.find(depth, |placement| found.push(placement));
+            for group in placements.groups() {
+                let placed = group.place(simd, 1.0 / plane.inverse_depth);
+                let slopes = group.slopes(simd, plane);
+                assert_eq!(placed.inside.checked_shr(group.sources().len() as u32).unwrap_or(0), 0);
+                assert_is_within(&placed, reference, group.sources());
+                for (lane, &source) in group.sources().iter().enumerate() {
+                    if placed.inside >> lane & 1 != 0 {
+                        let (x, y) = (placed.column[lane], placed.row[lane]);
+                        found.push(Placement { source, homography: placed.homography(&slopes, lane), x, y });
+                    }
+                }
+            }
             found
         };
-        depths.iter().map(place).collect()
+        planes.iter().map(place).collect()
+    }
+}
+
+/// Columns and rows are within the images also where the hypothesis is not.
+fn assert_is_within(placed: &Placed, reference: &Reference, sources: &[usize]) {
+    for lane in 0..LANES {
+        let image = sources.get(lane).map(|&source| reference.sources[source].image);
+        let (right, bottom) =
+            image.map_or((0.0, 0.0), |image| ((image.width - 1) as f32, (image.height - 1) as f32));
+        assert!((0.0..=right).contains(&placed.column[lane]), "lane {lane}: {placed:?}");
+        assert!((0.0..=bottom).contains(&placed.row[lane]), "lane {lane}: {placed:?}");
     }
 }
 
@@ -330,17 +370,22 @@ fn eight_sources_at_once_are_found_where_each_alone_is() {
     reference.sources = (views.sources.iter())
         .map(|camera| Source::new(&views.reference, camera, &views.image, &[]))
         .collect();
-    let depths = [0.001, 1.0, 2.5, 3.9, DEPTH, 4.1, 5.0, 8.0, 1e6];
+    let planes: Vec<SlantedPlane> = [0.001, 1.0, 2.5, 3.9, DEPTH, 4.1, 5.0, 8.0, 1e6]
+        .map(|depth| SlantedPlane { inverse_depth: 1.0 / depth, slope_x: 0.003, slope_y: -0.007 })
+        .into();
     let (mut inside, mut outside) = (0, 0);
     for set in [0x7ff, 0x555, 0x400, 0u32] {
         for (x, y) in [CENTRE, (0.0, 0.0), (40.0, 30.0), (7.0, 22.0)] {
-            let expected: Vec<Vec<Placement>> = (depths.iter())
-                .map(|depth| {
+            let expected: Vec<Vec<Placement>> = (planes.iter())
+                .map(|plane| {
                     let place = |source: usize| {
                         let Source { pose, .. } = &reference.sources[source];
-                        let centre = pose.at_infinity(x, y) + pose.epipole * (1.0 / depth);
-                        let at = reference.sources[source].project(centre)?;
-                        Some(Placement { source, centre, x: at.x, y: at.y })
+                        // The depth goes there and back, as it does for food sources.
+                        let plane =
+                            SlantedPlane { inverse_depth: 1.0 / (1.0 / plane.inverse_depth), ..*plane };
+                        let homography = pose.homography(pose.at_infinity(x, y), &plane);
+                        let at = reference.sources[source].project(homography.centre)?;
+                        Some(Placement { source, homography, x: at.x, y: at.y })
                     };
                     (0..11).filter(|source| set >> source & 1 != 0).filter_map(place).collect()
                 })
@@ -348,8 +393,11 @@ fn eight_sources_at_once_are_found_where_each_alone_is() {
             inside += expected.iter().map(Vec::len).sum::<usize>();
             outside += expected.iter().map(|found| set.count_ones() as usize - found.len()).sum::<usize>();
             for level in Level::ALL.into_iter().filter(|level| level.is_available()) {
-                let found = dispatch(level, Place(&reference, (x, y), &[set], &depths));
-                assert_eq!(found, expected, "{}", level.name());
+                for afterwards in [false, true] {
+                    let (reference, pixel, set) = (&reference, (x, y), &[set][..]);
+                    let task = Place { reference, pixel, set, planes: &planes, afterwards };
+                    assert_eq!(dispatch(level, task), expected, "{}", level.name());
+                }
             }
         }
     }

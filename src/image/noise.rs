@@ -64,3 +64,74 @@ fn flattest(mut deviations: Vec<f32>) -> f32 {
     let place = (deviations.len() as f64 * FLAT_SHARE) as usize;
     deviations.get(place).copied().unwrap_or(0.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ambc::Random;
+
+    fn picture((width, height): (u32, u32), grey: impl Fn(u32, u32) -> f32) -> Picture {
+        let values = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        let greys = values.map(|(x, y)| grey(x, y).round() as u8).collect();
+        Picture::from_grey(width, height, greys).unwrap()
+    }
+
+    /// Normally distributed with deviation 1, near enough, and the same for the same pixel.
+    fn white(x: u32, y: u32) -> f32 {
+        let mut random = Random::new(5, u64::from(y) << 32 | u64::from(x));
+        (0..12).map(|_| random.unit()).sum::<f32>() - 6.0
+    }
+
+    #[test]
+    fn white_noise_on_a_plane_of_grey_values_is_estimated_by_its_deviation() {
+        for deviation in [1.0f32, 1.5, 2.0] {
+            let slanted = |x, y| 50.0 + 0.7 * x as f32 + 0.5 * y as f32 + deviation * white(x, y);
+            let noise = Noise::of(&picture((128, 128), slanted));
+            for grey in [80, 120, 160] {
+                let found = noise.variance(grey).sqrt();
+                assert!((found / deviation - 1.0).abs() < 0.15, "{found} instead of {deviation} at {grey}");
+            }
+        }
+    }
+
+    #[test]
+    fn each_brightness_has_its_own_noise() {
+        let halves = |x, y| if x < 64 { 50.0 + 0.5 * white(x, y) } else { 200.0 + 2.0 * white(x, y) };
+        let noise = Noise::of(&picture((128, 128), halves));
+        let [dark, bright] = [50, 200].map(|grey| noise.variance(grey).sqrt());
+        assert!((dark - 0.5).abs() < 0.1 && (bright - 2.0).abs() < 0.3, "{dark} and {bright}");
+    }
+
+    #[test]
+    fn strong_smooth_gradients_are_no_noise() {
+        let steep = picture((64, 64), |x, y| 5.0 + 2.0 * x as f32 + y as f32);
+        let noise = Noise::of(&steep);
+        assert!((0..=255).all(|grey| noise.variance(grey) == 0.0), "{noise:?}");
+        let waves = |x: u32, y: u32| 128.0 + 60.0 * ((x as f32 / 9.0).sin() + (y as f32 / 11.0).cos());
+        let noise = Noise::of(&picture((128, 128), waves));
+        // Nothing but the rounding to whole grey values, of variance 1 / 12.
+        assert!((0..=255).all(|grey| noise.variance(grey) < 0.15), "{noise:?}");
+    }
+
+    #[test]
+    fn half_an_image_of_texture_does_not_hide_the_noise_of_the_other_half() {
+        let texture =
+            |x, y| if x < 64 { 100.0 + 40.0 * white(x, y).clamp(-2.0, 2.0) } else { 100.0 + white(x, y) };
+        let found = Noise::of(&picture((128, 128), texture)).variance(100).sqrt();
+        assert!((found - 1.0).abs() < 0.25, "{found}");
+    }
+
+    #[test]
+    fn an_image_without_noise_and_one_too_small_to_tell_have_none() {
+        for grey in [0.0, 3.0, 128.0, 255.0] {
+            let noise = Noise::of(&picture((64, 48), |_, _| grey));
+            assert!((0..=255).all(|grey| noise.variance(grey) == 0.0));
+        }
+        for size in [(1, 1), (1, 9), (9, 1), (2, 3), (8, 8), (9, 9), (64, 2), (9, 40)] {
+            let noise = Noise::of(&picture(size, |x, y| 128.0 + 9.0 * white(x, y)));
+            assert!((0..=255).all(|grey| noise.variance(grey) == 0.0), "{size:?}");
+        }
+        let smallest = Noise::of(&picture((10, 10), |x, y| 128.0 + white(x, y)));
+        assert!(smallest.variance(128) > 0.0);
+    }
+}

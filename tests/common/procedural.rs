@@ -158,6 +158,22 @@ impl Procedural {
         }
     }
 
+    /// The scene with noise of this deviation on every pixel, other in every view.
+    pub fn with_noise(mut self, deviation: f64) -> Procedural {
+        for (index, view) in self.views.iter_mut().enumerate() {
+            let (width, height) = (view.camera.width, view.camera.height);
+            let noisy = |pixel: usize| {
+                // The sum of twelve is normally distributed, near enough.
+                let draw = |octave| lattice_value(DVec3::new(index as f64, pixel as f64, -7.0), octave);
+                let offset = deviation * ((100..112).map(draw).sum::<f64>() - 6.0);
+                view.picture.rgb(pixel).map(|channel| (f64::from(channel) + offset).round() as u8)
+            };
+            let colours = (0..view.camera.pixels()).map(noisy).collect();
+            view.picture = Picture::from_rgb(width, height, colours).expect("one colour for each pixel");
+        }
+        self
+    }
+
     /// What is seen at the centre of a pixel.
     pub fn hit(&self, view: usize, pixel: usize) -> Option<Hit> {
         let camera = &self.views[view].camera;

@@ -4,6 +4,7 @@ mod bees;
 mod costs;
 mod planes;
 mod search;
+mod smoothness;
 
 use super::cost::Evaluator;
 use super::{CostRules, FoodSource};
