@@ -59,18 +59,20 @@ enum Belongs {
 }
 
 /// Gives the validated pixels that look more like a surface behind to that one, in so many passes, each of which moves
-/// edges by a few pixels at most.
+/// edges by a few pixels at most. Pixels in the midst of empty ones are given up where no search follows.
 pub fn trim(
     camera: &Camera,
     image: &PackedImage,
     range: DepthRange,
     solutions: &mut [Solution],
     passes: u32,
+    is_last: bool,
 ) {
     let weights = Weights::new();
     for _ in 0..passes {
         let planes = surface(camera, solutions);
-        let edges = Edges { camera, image, range, planes: &planes, before: solutions, weights: &weights };
+        let edges =
+            Edges { camera, image, range, planes: &planes, before: solutions, weights: &weights, is_last };
         let width = image.width;
         let trimmed: Vec<Solution> = (0..solutions.len())
             .into_par_iter()
@@ -98,6 +100,8 @@ struct Edges<'a> {
     planes: &'a [SlantedPlane],
     before: &'a [Solution],
     weights: &'a Weights,
+    /// Whether no search follows.
+    is_last: bool,
 }
 
 impl Edges<'_> {
@@ -152,6 +156,6 @@ impl Edges<'_> {
                 return Belongs::Behind { depth, normal };
             }
         }
-        if empty > EMPTY_FACTOR * same { Belongs::Nowhere } else { Belongs::ToItsOwn }
+        if self.is_last && empty > EMPTY_FACTOR * same { Belongs::Nowhere } else { Belongs::ToItsOwn }
     }
 }

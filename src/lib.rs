@@ -1,4 +1,6 @@
 //! skep turns calibrated photographs into depth, normal and source-view maps and a fused point cloud, on the CPU.
+//!
+//! [`how_it_works`] tells the steps of the method and what each is worth.
 
 #![warn(missing_docs)]
 #![deny(unsafe_code)]
@@ -37,6 +39,9 @@ pub use options::{Aggregation, FusionOptions, Options, Scale};
 pub use progress::{Hook, Phase, Progress, ignore_progress};
 pub use scene::{DepthRange, Scene, SparsePoint, View};
 pub use solve::{Offers, OwnMaps, State, Step, Steps, Verdicts, reconstruct};
+
+#[doc = include_str!("how_it_works.md")]
+pub mod how_it_works {}
 
 /// Compiles the example of the README.
 #[cfg(doctest)]

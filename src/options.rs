@@ -314,7 +314,7 @@ impl Default for Options {
         Options {
             scales: vec![
                 Scale { halvings: 1, foods: 4, first_iterations: 6, cycles: 4, cycle_iterations: 1 },
-                Scale { halvings: 0, foods: 2, first_iterations: 2, cycles: 3, cycle_iterations: 1 },
+                Scale { halvings: 0, foods: 2, first_iterations: 1, cycles: 2, cycle_iterations: 1 },
             ],
             finest_window_radius: 3,
             round_window: true,
@@ -329,7 +329,7 @@ impl Default for Options {
             edge_passes: 2,
             smoothing_passes: 1,
             triangulation_angle: (4.0, 40.0),
-            max_sources: 16,
+            max_sources: 12,
             reward: 0.1,
             geometric_weight: 0.2,
             consistent_share: 0.5,

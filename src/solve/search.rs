@@ -221,7 +221,8 @@ impl Steps {
         }
         let ScaledView { camera, image, range, .. } = self.scaled(state.step(), view);
         state.solved.judge(&verdicts.0);
-        trim(camera, image, *range, &mut state.solved.solutions, self.options.edge_passes);
+        let is_last = state.step() + 1 == self.all().len();
+        trim(camera, image, *range, &mut state.solved.solutions, self.options.edge_passes, is_last);
         for _ in 0..self.options.smoothing_passes {
             smooth(camera, image, *range, &mut state.solved.solutions);
         }
