@@ -227,7 +227,7 @@ mod tests {
         for (pixel, solution) in solutions.iter_mut().enumerate() {
             let mut random = Random::new(3, pixel as u64);
             solution.depth *= 1.0 + 0.003 * random.signed();
-            solution.normal = (solution.normal + 0.05 * signed(&mut random)).normalize();
+            solution.normal = (solution.normal + 0.02 * signed(&mut random)).normalize();
         }
         let before = errors(&solutions, &truth);
         smooth_grey(RANGE, &mut solutions);

@@ -10,15 +10,24 @@ fn run(made: &Procedural, options: Options) -> Reconstruction {
     reconstruct(&made.scene(), &Options { threads: 2, ..options }, &ignore_progress).unwrap()
 }
 
+/// Pixels of the panel whose window holds nothing else.
+fn is_inside_panel(made: &Procedural, view: usize, pixel: usize) -> bool {
+    let width = made.views[view].camera.width as usize;
+    let on_panel = |pixel: usize| made.hit(view, pixel).is_some_and(|hit| hit.surface == procedural::PANEL);
+    let margin = Options::default().window_radius as usize + 1;
+    on_panel(pixel)
+        && [margin, margin * width].iter().all(|step| on_panel(pixel - step) && on_panel(pixel + step))
+}
+
 #[test]
 fn a_panel_that_shows_nothing_but_noise_continues_the_wall_around_it() {
     let made = procedural::textureless_panel().only(&[1, 3, 4, 5, 7]).with_noise(1.0);
-    let recovered = |noise_ratio: f64| {
-        let result = run(&made, Options { noise_ratio, ..Options::default() });
+    let recovered = |options: Options| {
+        let result = run(&made, options);
         let mut share = Share::default();
         for (index, (view, truth)) in result.views.iter().zip(&made.truth).enumerate() {
             for pixel in 0..truth.depth.len() {
-                if made.hit(index, pixel).is_some_and(|hit| hit.surface == procedural::PANEL) {
+                if is_inside_panel(&made, index, pixel) {
                     let off = (view.estimate.depth[pixel] / truth.depth[pixel] - 1.0).abs();
                     share.add(view.outcome[pixel] == Outcome::Validated && off < 0.01);
                 }
@@ -26,10 +35,15 @@ fn a_panel_that_shows_nothing_but_noise_continues_the_wall_around_it() {
         }
         share
     };
-    let (with, without) = (recovered(Options::default().noise_ratio), recovered(0.0));
-    assert!(with.count > 2_000, "{with:?}");
-    assert!(with.value() > 0.8, "{} of the panel is validated and right", with.value());
-    assert!(without.value() < with.value() - 0.2, "{} without and {} with", without.value(), with.value());
+    let all = recovered(Options::default());
+    assert!(all.count > 500, "{all:?}");
+    assert!(all.value() > 0.9, "{} of the panel is validated and right", all.value());
+    // Smoothness, reward and other views carry planes into so small a panel too: without them filling is alone, but for
+    // the coarser scale, where the panel is smaller still.
+    let alone = Options { reward: 0.0, smoothness: 0.0, propagation: false, ..Options::default() };
+    let with = recovered(alone.clone()).value();
+    let without = recovered(Options { noise_ratio: 0.0, ..alone }).value();
+    assert!(with > 0.9 && without < with - 0.1, "{with} with filling alone and {without} without it");
 }
 
 #[test]

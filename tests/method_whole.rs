@@ -165,13 +165,14 @@ fn is_inside_panel(made: &Procedural, view: usize, pixel: usize, margin: usize) 
 #[test]
 fn a_panel_without_texture_is_recovered_with_the_reward_or_smoothness_and_not_without_both() {
     let made = procedural::textureless_panel().only(&[1, 3, 4, 5, 7]);
-    // Nothing else may carry planes inwards: neither coarser scales, where the panel is small, nor other views.
+    // Nothing else may carry planes inwards: neither coarser scales, where the panel is small, nor other views, nor filling.
     let scale = Scale { halvings: 0, foods: 3, first_iterations: 6, cycles: 16, cycle_iterations: 1 };
     let alone = Options {
         scales: vec![scale],
         stop_share: 0.0,
         propagation: false,
         geometric_weight: 0.0,
+        noise_ratio: 0.0,
         ..options()
     };
     let margin = options().window_radius as usize + 1;

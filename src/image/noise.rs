@@ -89,7 +89,9 @@ mod tests {
             let noise = Noise::of(&picture((128, 128), slanted));
             for grey in [80, 120, 160] {
                 let found = noise.variance(grey).sqrt();
-                assert!((found / deviation - 1.0).abs() < 0.15, "{found} instead of {deviation} at {grey}");
+                // The flattest blocks understate it a little.
+                let share = found / deviation;
+                assert!((0.8..1.05).contains(&share), "{found} instead of {deviation} at {grey}");
             }
         }
     }
