@@ -10,11 +10,8 @@ use glam::{DMat3, DVec3, Vec3};
 const RIM: usize = 3;
 /// Relative difference of inverse depths within which a pixel of the rim lies on the plane.
 const TOLERANCE: f64 = 0.004;
-/// Share of the rim that must.
+/// Share of the outline of a part along which it must: a sky goes on from the ground on one side only.
 const MIN_SHARE: f64 = 0.6;
-/// Pixels of the rim that must, by the square root of the area: around a disc there are 3.5 for each pixel of width. Less
-/// is no frame, and the plane is a guess far from it.
-const MIN_FRAME: f64 = 1.5;
 /// Planes through three pixels of the rim that are tried, and pixels they are tried on.
 const TRIALS: usize = 100;
 const WITNESSES: usize = 300;
@@ -37,13 +34,13 @@ pub fn fill(reference: &Reference, planes: &mut [FoodSource], weak: &[bool]) -> 
             continue;
         }
         parts += 1;
-        let (part, rim) = trace(planes, weak, width, pixel, parts, &mut part_of);
+        let (part, rim, framed) = trace(planes, weak, width, pixel, parts, &mut part_of);
         let witness = |&pixel: &usize| Witness {
             place: DVec3::new((pixel % width) as f64, (pixel / width) as f64, 1.0),
             inverse_depth: 1.0 / f64::from(planes[pixel].depth),
         };
         let rim: Vec<Witness> = rim.iter().map(witness).collect();
-        if let Some(plane) = common_plane(&rim, part.len(), u64::from(parts)) {
+        if let Some(plane) = common_plane(&rim, framed, u64::from(parts)) {
             for pixel in part {
                 if let Some(found) = on_plane(reference, plane, (pixel % width, pixel / width)) {
                     planes[pixel] = FoodSource { cost: planes[pixel].cost, ..found };
@@ -59,7 +56,8 @@ fn is_open(planes: &[FoodSource], weak: &[bool], pixel: usize) -> bool {
     weak[pixel] && !planes[pixel].validated && planes[pixel].depth > 0.0
 }
 
-/// The connected part a pixel belongs to, and the validated pixels around it.
+/// The connected part a pixel belongs to, the validated pixels around it, and the share of its outline along which there
+/// are any.
 fn trace(
     planes: &[FoodSource],
     weak: &[bool],
@@ -67,7 +65,7 @@ fn trace(
     first: usize,
     number: u32,
     part_of: &mut [u32],
-) -> (Vec<usize>, Vec<usize>) {
+) -> (Vec<usize>, Vec<usize>, f64) {
     let height = planes.len() / width;
     let neighbours = |pixel: usize| {
         let (x, y) = (pixel % width, pixel / width);
@@ -80,12 +78,21 @@ fn trace(
     };
     let mut part = vec![first];
     part_of[first] = number;
+    let (mut framed, mut outline) = (0, 0);
     let mut next = 0;
     while next < part.len() {
-        for neighbour in neighbours(part[next]).into_iter().flatten() {
-            if part_of[neighbour] != number && is_open(planes, weak, neighbour) {
-                part_of[neighbour] = number;
-                part.push(neighbour);
+        for neighbour in neighbours(part[next]) {
+            match neighbour {
+                Some(neighbour) if is_open(planes, weak, neighbour) => {
+                    if part_of[neighbour] != number {
+                        part_of[neighbour] = number;
+                        part.push(neighbour);
+                    }
+                }
+                other => {
+                    outline += 1;
+                    framed += u32::from(other.is_some_and(|other| planes[other].validated));
+                }
             }
         }
         next += 1;
@@ -106,13 +113,13 @@ fn trace(
         start = end;
         rim.extend(found);
     }
-    (part, rim)
+    (part, rim, f64::from(framed) / f64::from(outline.max(1)))
 }
 
-/// The plane, as inverse depth over column, row and 1, that enough of the rim lies on.
-fn common_plane(rim: &[Witness], area: usize, part: u64) -> Option<DVec3> {
-    let frame = MIN_FRAME * RIM as f64 * (area as f64).sqrt();
-    if rim.len() < 3 || (rim.len() as f64) < frame {
+/// The plane, as inverse depth over column, row and 1, that enough of the rim lies on, which frames this share of the
+/// outline.
+fn common_plane(rim: &[Witness], framed: f64, part: u64) -> Option<DVec3> {
+    if rim.len() < 3 || framed < MIN_SHARE {
         return None;
     }
     let lies_on = |plane: DVec3| {
@@ -122,7 +129,7 @@ fn common_plane(rim: &[Witness], area: usize, part: u64) -> Option<DVec3> {
         }
     };
     let every = rim.len().div_ceil(WITNESSES);
-    let mut random = Random::new(part, area as u64);
+    let mut random = Random::new(part, rim.len() as u64);
     let mut best = (0, DVec3::ZERO);
     for _ in 0..TRIALS {
         let three = [(); 3].map(|()| rim[random.below(rim.len())]);
@@ -138,8 +145,8 @@ fn common_plane(rim: &[Witness], area: usize, part: u64) -> Option<DVec3> {
         }
     }
     let plane = least_squares(rim.iter().filter(lies_on(best.1)))?;
-    let count = rim.iter().filter(lies_on(plane)).count() as f64;
-    (count >= MIN_SHARE * rim.len() as f64 && count >= frame).then_some(plane)
+    let share = rim.iter().filter(lies_on(plane)).count() as f64 / rim.len() as f64;
+    (share * framed >= MIN_SHARE).then_some(plane)
 }
 
 fn least_squares<'a>(witnesses: impl Iterator<Item = &'a Witness>) -> Option<DVec3> {
@@ -285,10 +292,11 @@ mod tests {
 
     #[test]
     fn a_hole_at_the_border_is_filled_unless_it_is_framed_too_little() {
-        let mut shallow = holed(|_, y| y >= 40);
-        let filled = shallow.fill();
-        assert_eq!(filled, shallow.hole());
-        shallow.assert_on_the_wall(&filled);
+        let mut framed = holed(|x, y| (16..45).contains(&x) && y >= 30);
+        let filled = framed.fill();
+        assert_eq!(filled, framed.hole());
+        framed.assert_on_the_wall(&filled);
+        assert_eq!(holed(|_, y| y < 8).fill(), [], "a sky");
         assert_eq!(holed(|_, y| y >= 12).fill(), []);
         assert_eq!(holed(|_, _| true).fill(), [], "nothing is around it");
     }
