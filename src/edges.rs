@@ -169,9 +169,8 @@ mod tests {
 
     const SIZE: (u32, u32) = (48, 32);
     const RANGE: DepthRange = DepthRange { near: 1.0, far: 20.0 };
-    /// Columns the near surface really covers, and those it comes out with.
+    /// Columns the near surface really covers.
     const TRUE_EDGE: usize = 20;
-    const WIDE_EDGE: usize = 24;
 
     fn camera() -> Camera {
         let (width, height) = SIZE;
@@ -194,9 +193,10 @@ mod tests {
         PackedImage::new(&Picture::from_grey(width, height, grey.collect()).unwrap())
     }
 
-    fn solutions(behind: f32) -> Vec<Solution> {
+    /// The near surface comes out some columns too wide.
+    fn solutions(behind: f32, too_wide: usize) -> Vec<Solution> {
         let of = |pixel: usize| Solution {
-            depth: if pixel % SIZE.0 as usize >= WIDE_EDGE { behind } else { 4.0 },
+            depth: if pixel % SIZE.0 as usize >= TRUE_EDGE + too_wide { behind } else { 4.0 },
             normal: Vec3::NEG_Z,
             consistent: 3,
             validated: true,
@@ -206,8 +206,8 @@ mod tests {
 
     #[test]
     fn a_near_surface_that_came_out_too_wide_ends_where_the_grey_values_do() {
-        let mut trimmed = solutions(8.0);
-        trim(&camera(), &image(), RANGE, &mut trimmed, 4, false);
+        let mut trimmed = solutions(8.0, 4);
+        trim(&camera(), &image(), RANGE, &mut trimmed, 10, false);
         for (pixel, solution) in trimmed.iter().enumerate() {
             let expected = if pixel % SIZE.0 as usize >= TRUE_EDGE { 8.0 } else { 4.0 };
             assert!((solution.depth - expected).abs() < 1e-3, "{} at {pixel}", solution.depth);
@@ -220,20 +220,20 @@ mod tests {
         let (width, height) = SIZE;
         let grey = vec![100; (width * height) as usize];
         let plain = PackedImage::new(&Picture::from_grey(width, height, grey).unwrap());
-        let mut same = solutions(8.0);
+        let mut same = solutions(8.0, 4);
         trim(&camera(), &plain, RANGE, &mut same, 1, false);
-        let moved = same.iter().zip(solutions(8.0)).filter(|(after, before)| *after != before).count();
+        let moved = same.iter().zip(solutions(8.0, 4)).filter(|(after, before)| *after != before).count();
         // Where nothing tells the surfaces apart the nearer neighbours decide: no more than a column of ties.
         assert!(moved <= height as usize, "{moved}");
-        let mut single = solutions(4.0);
+        let mut single = solutions(4.0, 4);
         trim(&camera(), &image(), RANGE, &mut single, 4, true);
-        assert_eq!(single, solutions(4.0));
+        assert_eq!(single, solutions(4.0, 4));
     }
 
     #[test]
     fn pixels_before_nothing_are_given_up_where_no_search_follows() {
-        for (is_last, kept) in [(false, WIDE_EDGE), (true, TRUE_EDGE)] {
-            let mut before_nothing = solutions(0.0);
+        for (is_last, kept) in [(false, TRUE_EDGE + 1), (true, TRUE_EDGE)] {
+            let mut before_nothing = solutions(0.0, 1);
             before_nothing.iter_mut().for_each(|solution| solution.validated = solution.depth > 0.0);
             trim(&camera(), &image(), RANGE, &mut before_nothing, 4, is_last);
             let row = &before_nothing[16 * SIZE.0 as usize..][..SIZE.0 as usize];
@@ -244,8 +244,8 @@ mod tests {
     #[test]
     fn a_surface_behind_that_leaves_the_depth_range_is_not_given_anything() {
         let range = DepthRange { near: 1.0, far: 6.0 };
-        let mut trimmed = solutions(8.0);
+        let mut trimmed = solutions(8.0, 4);
         trim(&camera(), &image(), range, &mut trimmed, 4, false);
-        assert_eq!(trimmed, solutions(8.0));
+        assert_eq!(trimmed, solutions(8.0, 4));
     }
 }

@@ -10,8 +10,12 @@ use glam::{DMat3, DVec3, Vec3};
 const RIM: usize = 3;
 /// Relative difference of inverse depths within which a pixel of the rim lies on the plane.
 const TOLERANCE: f64 = 0.004;
-/// Share of the outline of a part along which it must: a sky goes on from the ground on one side only.
+/// Share of the rim that must, reckoned as if it went on along the border of the image without lying on the plane: a sky
+/// goes on from the ground on one side only.
 const MIN_SHARE: f64 = 0.6;
+/// Pixels a rim has at least, by the square root of the part's area: a full one around a disc has 3.5 for each pixel of its
+/// width.
+const MIN_FRAME: f64 = 1.5;
 /// Planes through three pixels of the rim that are tried, and pixels they are tried on.
 const TRIALS: usize = 100;
 const WITNESSES: usize = 300;
@@ -40,7 +44,7 @@ pub fn fill(reference: &Reference, planes: &mut [FoodSource], weak: &[bool]) -> 
             inverse_depth: 1.0 / f64::from(planes[pixel].depth),
         };
         let rim: Vec<Witness> = rim.iter().map(witness).collect();
-        if let Some(plane) = common_plane(&rim, framed, u64::from(parts)) {
+        if let Some(plane) = common_plane(&rim, (part.len(), framed), u64::from(parts)) {
             for pixel in part {
                 if let Some(found) = on_plane(reference, plane, (pixel % width, pixel / width)) {
                     planes[pixel] = FoodSource { cost: planes[pixel].cost, ..found };
@@ -56,8 +60,8 @@ fn is_open(planes: &[FoodSource], weak: &[bool], pixel: usize) -> bool {
     weak[pixel] && !planes[pixel].validated && planes[pixel].depth > 0.0
 }
 
-/// The connected part a pixel belongs to, the validated pixels around it, and the share of its outline along which there
-/// are any.
+/// The connected part a pixel belongs to, the validated pixels around it, and their share of its outline, the rest of
+/// which is the border of the image.
 fn trace(
     planes: &[FoodSource],
     weak: &[bool],
@@ -89,9 +93,11 @@ fn trace(
                         part.push(neighbour);
                     }
                 }
+                // Pixels without a surface say nothing.
+                Some(neighbour) if !planes[neighbour].validated => {}
                 other => {
                     outline += 1;
-                    framed += u32::from(other.is_some_and(|other| planes[other].validated));
+                    framed += u32::from(other.is_some());
                 }
             }
         }
@@ -116,10 +122,11 @@ fn trace(
     (part, rim, f64::from(framed) / f64::from(outline.max(1)))
 }
 
-/// The plane, as inverse depth over column, row and 1, that enough of the rim lies on, which frames this share of the
-/// outline.
-fn common_plane(rim: &[Witness], framed: f64, part: u64) -> Option<DVec3> {
-    if rim.len() < 3 || framed < MIN_SHARE {
+/// The plane, as inverse depth over column, row and 1, that enough of the rim of a part of this area lies on; the rim is
+/// this share of the outline.
+fn common_plane(rim: &[Witness], (area, framed): (usize, f64), part: u64) -> Option<DVec3> {
+    let frame = MIN_FRAME * RIM as f64 * (area as f64).sqrt();
+    if rim.len() < 3 || (rim.len() as f64) < frame || framed < MIN_SHARE {
         return None;
     }
     let lies_on = |plane: DVec3| {
