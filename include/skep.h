@@ -568,7 +568,7 @@ size_t skep_last_error(char *buffer,
                        size_t capacity);
 
 /**
- * Makes options from a preset: "default" (or NULL), which measures best, "fast", which takes less than half of its
+ * Makes options from a preset: "default" (or NULL), which measures best, "fast", which takes about half of its
  * time, or "paper", which follows the paper to the letter.
  */
 skep_status skep_options_create(const char *preset_or_null,
