@@ -153,7 +153,7 @@ static void check_clouds(const skep_result *result) {
     REQUIRE(skep_result_get_cloud(result, &cloud));
     size_t count = 0, total = 0;
     REQUIRE(skep_cloud_get_count(cloud, &count, &total));
-    CHECK(count > 20 && total > count, "%zu points", count);
+    CHECK(count > 5 && total > count, "%zu points", count);
     FAILS(skep_cloud_get_count(NULL, OUT(size_t, 0), OUT(size_t, 1)), SKEP_ERR_NULL, "cloud");
     FAILS(skep_cloud_get_count(cloud, NULL, OUT(size_t, 1)), SKEP_ERR_NULL, "count_out");
     FAILS(skep_cloud_get_points(NULL, OUT(double, 0), OUT(float, 1), OUT(uint8_t, 2), count),

@@ -297,6 +297,10 @@ skep_options *quick_options(void) {
     REQUIRE(skep_options_set_scales(options, scales, 2));
     REQUIRE(skep_options_set(options, "threads", 2));
     REQUIRE(skep_options_set(options, "fusion.min_views", 2));
+    if (scene_is_small()) {
+        /* All of it is edge. */
+        REQUIRE(skep_options_set(options, "edge_passes", 0));
+    }
     return options;
 }
 
