@@ -4,9 +4,8 @@
 use crate::ambc::MIN_FACING;
 use crate::camera::Camera;
 use crate::image::PackedImage;
-use crate::kernels::SlantedPlane;
 use crate::scene::DepthRange;
-use crate::state::Solution;
+use crate::state::{Solution, surface};
 use glam::{DVec2, Vec3};
 use rayon::prelude::*;
 
@@ -65,23 +64,9 @@ struct Sums {
 /// Smooths the validated solutions of a view; planes that would leave the depth range or turn away stay.
 pub fn smooth(camera: &Camera, image: &PackedImage, range: DepthRange, solutions: &mut [Solution]) {
     let (width, height) = (image.width, image.height);
-    let inverse_focal = ((1.0 / camera.fx) as f32, (1.0 / camera.fy) as f32);
     let ray = |x: usize, y: usize| camera.ray(DVec2::new(x as f64, y as f64)).as_vec3();
     let surface = {
-        let plane = |pixel: usize| {
-            let solution = &solutions[pixel];
-            let none = SlantedPlane { inverse_depth: 0.0, slope_x: 0.0, slope_y: 0.0 };
-            if !solution.validated {
-                return none;
-            }
-            SlantedPlane::new(
-                solution.depth,
-                solution.normal,
-                ray(pixel % width, pixel / width),
-                inverse_focal,
-            )
-        };
-        let planes: Vec<SlantedPlane> = (0..solutions.len()).into_par_iter().map(plane).collect();
+        let planes = surface(camera, solutions);
         Surface {
             inverse_depth: Padded::new(width, height, |pixel| planes[pixel].inverse_depth),
             slope: [

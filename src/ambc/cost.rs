@@ -241,7 +241,8 @@ impl<'a, S: Simd> Evaluator<'a, S> {
             })
             .sum();
         let all = self.seen();
-        if all > count && agreeing < count {
+        let is_matched = all > count && agreeing < count;
+        if is_matched {
             let plane = food.plane(self.reference, self.ray);
             (0..self.views.len()).for_each(|group| self.add_photometric_costs(&plane, group));
         }
@@ -261,7 +262,17 @@ impl<'a, S: Simd> Evaluator<'a, S> {
                 }
                 ViewSets::insert_into(set, self.placements.groups()[best.1].sources()[best.2]);
             }
+            // What was matched to choose the views is not matched again.
+            for (group, view) in self.placements.groups().iter().zip(&mut self.views) {
+                for (lane, &source) in group.sources().iter().enumerate() {
+                    view.placed.inside &= !(u8::from(!ViewSets::holds(set, source)) << lane);
+                }
+            }
             self.placements.keep(set);
+            if let (Aggregation::BestViews(best), true) = (self.rules.aggregation, is_matched) {
+                let best = (best as usize).min(kept);
+                return sum_of_least(&self.views, kept, best) / best as f32;
+            }
         }
         self.cost(food, f32::INFINITY)
     }
