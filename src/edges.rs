@@ -28,10 +28,16 @@ const EMPTY_FACTOR: f32 = 2.0;
 const PROBES: [(i32, i32); 12] =
     [(3, 0), (-3, 0), (0, 3), (0, -3), (6, 0), (-6, 0), (0, 6), (0, -6), (4, 4), (-4, 4), (4, -4), (-4, -4)];
 
-/// How much neighbours count.
+/// The neighbourhood, and how much neighbours count.
 struct Weights {
-    offsets: Vec<((i32, i32), f32)>,
+    neighbours: Vec<Neighbour>,
     by_grey: [f32; 256],
+}
+
+/// A place in the neighbourhood.
+struct Neighbour {
+    offset: (i32, i32),
+    weight: f32,
 }
 
 impl Weights {
@@ -39,10 +45,12 @@ impl Weights {
         let gaussian = |value: f32, sigma: f32| (-value * value / (2.0 * sigma * sigma)).exp();
         let offsets = (-RADIUS..=RADIUS).flat_map(|dy| (-RADIUS..=RADIUS).map(move |dx| (dx, dy)));
         let near = |&(dx, dy): &(i32, i32)| dx * dx + dy * dy <= RADIUS * RADIUS + 1 && (dx, dy) != (0, 0);
-        let weigh =
-            |(dx, dy): (i32, i32)| ((dx, dy), gaussian(((dx * dx + dy * dy) as f32).sqrt(), SPATIAL_SIGMA));
+        let weigh = |(dx, dy): (i32, i32)| Neighbour {
+            offset: (dx, dy),
+            weight: gaussian(((dx * dx + dy * dy) as f32).sqrt(), SPATIAL_SIGMA),
+        };
         Weights {
-            offsets: offsets.filter(near).map(weigh).collect(),
+            neighbours: offsets.filter(near).map(weigh).collect(),
             by_grey: std::array::from_fn(|difference| gaussian(difference as f32, GREY_SIGMA)),
         }
     }
@@ -69,6 +77,7 @@ pub fn trim(
     is_last: bool,
 ) {
     let weights = Weights::new();
+    let mut moved = Moved::everywhere(image.width, image.height);
     for _ in 0..passes {
         let planes = surface(camera, solutions);
         let edges =
@@ -79,7 +88,8 @@ pub fn trim(
             .with_min_len(width)
             .map(|pixel| {
                 let solution = edges.before[pixel];
-                if !solution.validated {
+                // Where nothing moved in the pass before, nothing moves in this one.
+                if !solution.validated || !moved.is_near(pixel % width, pixel / width) {
                     return solution;
                 }
                 match edges.judge((pixel % width, pixel / width)) {
@@ -89,7 +99,44 @@ pub fn trim(
                 }
             })
             .collect();
+        moved = Moved::between(solutions, &trimmed, width);
         solutions.copy_from_slice(&trimmed);
+    }
+}
+
+/// The blocks of the image in which a pass moved an edge.
+struct Moved {
+    blocks: Vec<bool>,
+    columns: usize,
+}
+
+impl Moved {
+    /// Side of a block, in pixels: more than the neighbourhood's half side.
+    const BLOCK: usize = 8;
+
+    fn everywhere(width: usize, height: usize) -> Moved {
+        let columns = width.div_ceil(Moved::BLOCK);
+        Moved { blocks: vec![true; columns * height.div_ceil(Moved::BLOCK)], columns }
+    }
+
+    fn between(before: &[Solution], after: &[Solution], width: usize) -> Moved {
+        let mut moved = Moved::everywhere(width, before.len().div_ceil(width.max(1)));
+        moved.blocks.fill(false);
+        for pixel in (0..before.len()).filter(|&pixel| before[pixel] != after[pixel]) {
+            let (column, row) = (pixel % width / Moved::BLOCK, pixel / width / Moved::BLOCK);
+            moved.blocks[row * moved.columns + column] = true;
+        }
+        moved
+    }
+
+    /// Whether anything in the neighbourhood of a pixel moved.
+    fn is_near(&self, x: usize, y: usize) -> bool {
+        let rows = self.blocks.len() / self.columns;
+        let span = |at: usize, count: usize| {
+            let last = (at + RADIUS as usize) / Moved::BLOCK;
+            at.saturating_sub(RADIUS as usize) / Moved::BLOCK..=last.min(count - 1)
+        };
+        span(y, rows).any(|row| span(x, self.columns).any(|column| self.blocks[row * self.columns + column]))
     }
 }
 
@@ -123,20 +170,25 @@ impl Edges<'_> {
         let pixel = at.1 * self.image.width + at.0;
         let own = self.planes[pixel].inverse_depth;
         let is_edge = |&offset: &(i32, i32)| {
-            let neighbour = self.neighbour(at, offset);
-            neighbour
-                .is_some_and(|other| self.difference(own, other, offset).is_none_or(|d| d.abs() > BEHIND))
+            let difference = self.neighbour(at, offset).map(|other| self.difference(own, other, offset));
+            difference.is_some_and(|difference| difference.map_or(self.is_last, |d| d < -BEHIND))
         };
         if !PROBES.iter().any(is_edge) {
             return Belongs::ToItsOwn;
         }
+        let is_inside = |at: usize, size: usize| at >= RADIUS as usize && at + (RADIUS as usize) < size;
+        let nothing_is_outside = is_inside(at.0, self.image.width) && is_inside(at.1, self.image.height);
         let grey = self.image.grey(at.0, at.1);
         let (mut same, mut behind, mut empty) = (1.0, 0.0, 0.0);
         let (mut inverse_depth, mut normal) = (0.0, Vec3::ZERO);
-        for &(offset, weight) in &self.weights.offsets {
-            let Some(other) = self.neighbour(at, offset) else { continue };
-            let other_grey = self.image.grey(other % self.image.width, other / self.image.width);
-            let weight = weight * self.weights.by_grey[usize::from(grey.abs_diff(other_grey))];
+        for &Neighbour { offset, weight } in &self.weights.neighbours {
+            let (x, y) =
+                (at.0.wrapping_add_signed(offset.0 as isize), at.1.wrapping_add_signed(offset.1 as isize));
+            if !nothing_is_outside && (x >= self.image.width || y >= self.image.height) {
+                continue;
+            }
+            let other = y * self.image.width + x;
+            let weight = weight * self.weights.by_grey[usize::from(grey.abs_diff(self.image.grey(x, y)))];
             match self.difference(own, other, offset) {
                 None => empty += weight,
                 Some(difference) if difference.abs() < SAME => same += weight,
@@ -213,6 +265,17 @@ mod tests {
             assert!((solution.depth - expected).abs() < 1e-3, "{} at {pixel}", solution.depth);
             assert!(solution.validated);
         }
+    }
+
+    #[test]
+    fn passes_that_only_look_where_something_moved_find_all_that_moves() {
+        let mut at_once = solutions(8.0, 4);
+        trim(&camera(), &image(), RANGE, &mut at_once, 6, true);
+        let mut one_by_one = solutions(8.0, 4);
+        for _ in 0..6 {
+            trim(&camera(), &image(), RANGE, &mut one_by_one, 1, true);
+        }
+        assert_eq!(at_once, one_by_one);
     }
 
     #[test]

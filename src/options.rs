@@ -104,6 +104,15 @@ pub struct Options {
     /// Angle between normals that contradicts altogether, in degrees.
     pub smoothness_normal: f64,
 
+    /// Food sources of each colony, the best first, that employed bees work on from the second cycle on; 0 for all of
+    /// them (`paper`).
+    pub employed_foods: u32,
+    /// Neighbours drawn at random of which an onlooker bee visits the one of the cheapest plane; 1 in `paper`.
+    pub neighbours_drawn: u32,
+    /// Relative difference of inverse depths up to which a neighbour's depth continues the plane of a pixel: in every
+    /// iteration the plane fitted to such depths is tried. 0 tries none (`paper`).
+    pub plane_fit: f64,
+
     /// How often validated pixels that look more like a surface behind theirs are given to that one, after every check;
     /// 0 for never (`paper`).
     pub edge_passes: u32,
@@ -195,6 +204,9 @@ impl Options {
             smoothness: 0.0,
             smoothness_depth: 0.01,
             smoothness_normal: 40.0,
+            employed_foods: 0,
+            neighbours_drawn: 1,
+            plane_fit: 0.0,
             edge_passes: 0,
             smoothing_passes: 0,
             view_selection: true,
@@ -313,7 +325,7 @@ impl Default for Options {
     fn default() -> Options {
         Options {
             scales: vec![
-                Scale { halvings: 1, foods: 4, first_iterations: 6, cycles: 4, cycle_iterations: 1 },
+                Scale { halvings: 1, foods: 3, first_iterations: 5, cycles: 4, cycle_iterations: 1 },
                 Scale { halvings: 0, foods: 2, first_iterations: 1, cycles: 2, cycle_iterations: 1 },
             ],
             finest_window_radius: 3,
@@ -326,6 +338,9 @@ impl Default for Options {
             restart_spread: 0.01,
             restart_tilt: 0.3,
             smoothness: 0.1,
+            employed_foods: 1,
+            neighbours_drawn: 2,
+            plane_fit: 0.02,
             edge_passes: 2,
             smoothing_passes: 1,
             triangulation_angle: (4.0, 40.0),

@@ -4,7 +4,7 @@ use crate::ambc::MIN_FACING;
 use crate::camera::Camera;
 use crate::kernels::SlantedPlane;
 use crate::scene::DepthRange;
-use crate::views::ViewSets;
+use crate::views::{ShownPlane, ViewSets};
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -30,8 +30,8 @@ pub struct ViewState {
     pub cost: Vec<f32>,
     /// The view set each was matched with.
     pub sets: ViewSets,
-    /// The validated solutions as planes, inverse depth 0 elsewhere: what other views look up.
-    pub surface: Vec<SlantedPlane>,
+    /// The validated solutions as other views look them up.
+    pub surface: Vec<ShownPlane>,
 }
 
 impl ViewState {
@@ -51,7 +51,7 @@ impl ViewState {
 
     /// Brings the surface up to date with the solutions.
     pub fn show(&mut self, camera: &Camera) {
-        self.surface = surface(camera, &self.solutions);
+        self.surface = shown(camera, &self.solutions);
     }
 
     /// Number of validated solutions.
@@ -86,9 +86,12 @@ impl ViewState {
             }
         };
         let solutions: Vec<Solution> = (0..fine.pixels()).into_par_iter().map(refine).collect();
-        let surface = surface(fine, &solutions);
+        let surface = shown(fine, &solutions);
         let cost = (0..fine.pixels()).map(|pixel| self.cost[parent(pixel)]).collect();
-        let sets = self.sets.of((0..fine.pixels()).map(parent));
+        let mut sets = self.sets.clone();
+        if !sets.is_clear() {
+            sets = sets.of((0..fine.pixels()).map(parent));
+        }
         ViewState { solutions, cost, sets, surface }
     }
 }
@@ -99,18 +102,26 @@ fn facing(normal: DVec3, ray: DVec3) -> DVec3 {
     if away <= 0.0 { normal } else { (normal - ray * (away / ray.length_squared())).normalize() }
 }
 
+fn shown(camera: &Camera, solutions: &[Solution]) -> Vec<ShownPlane> {
+    planes(camera, solutions).map(ShownPlane::from).collect()
+}
+
 /// The validated solutions as planes, inverse depth 0 elsewhere.
 pub fn surface(camera: &Camera, solutions: &[Solution]) -> Vec<SlantedPlane> {
+    planes(camera, solutions).collect()
+}
+
+fn planes(camera: &Camera, solutions: &[Solution]) -> impl IndexedParallelIterator<Item = SlantedPlane> {
     let width = camera.width as usize;
     let inverse_focal = ((1.0 / camera.fx) as f32, (1.0 / camera.fy) as f32);
-    let plane = |(pixel, solution): (usize, &Solution)| {
+    let plane = move |(pixel, solution): (usize, &Solution)| {
         if !solution.validated {
             return SlantedPlane { inverse_depth: 0.0, slope_x: 0.0, slope_y: 0.0 };
         }
         let ray = camera.ray(DVec2::new((pixel % width) as f64, (pixel / width) as f64)).as_vec3();
         SlantedPlane::new(solution.depth, solution.normal, ray, inverse_focal)
     };
-    solutions.par_iter().enumerate().map(plane).collect()
+    solutions.par_iter().enumerate().map(plane)
 }
 
 #[cfg(test)]
@@ -147,7 +158,7 @@ mod tests {
             let parent = pixel / 6 / 2 * 3 + pixel % 6 / 2;
             assert_eq!(refined.solutions[pixel].depth == 0.0, parent == none);
             assert_eq!(refined.solutions[pixel].validated, parent == none + 1);
-            assert_eq!(refined.surface[pixel].inverse_depth > 0.0, parent == none + 1);
+            assert_eq!(refined.surface[pixel].inverse_depth() > 0.0, parent == none + 1);
         }
     }
 
@@ -195,9 +206,9 @@ mod tests {
             assert_eq!((solution.consistent, solution.validated), verdicts[pixel]);
             let plane = &state.surface[pixel];
             let shown = if pixel % 3 == 0 { 1.0 / solution.depth } else { 0.0 };
-            assert_eq!(plane.inverse_depth, shown);
+            assert_eq!(plane.inverse_depth(), shown);
             if solution.validated && pixel % 6 < 5 {
-                let right = 1.0 / plane.inverse_depth_at(1.0, 0.0);
+                let right = 1.0 / (plane.inverse_depth() + plane.slopes().0);
                 assert!((right / testing::depth(&camera, pixel + 1) - 1.0).abs() < 1e-5);
             }
         }

@@ -3,10 +3,10 @@
 
 use crate::camera::{Camera, Plane};
 use crate::image::{PackedImage, Picture};
-use crate::kernels::{SlantedPlane, Window};
+use crate::kernels::Window;
 use crate::scene::DepthRange;
 use crate::state::{Solution, ViewState};
-use crate::views::{Reference, Source, ViewSets};
+use crate::views::{Reference, ShownPlane, Source, ViewSets};
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
 /// The wall's depths lie well inside.
@@ -17,7 +17,7 @@ pub struct World {
     pub cameras: Vec<Camera>,
     pub images: Vec<PackedImage>,
     /// The validated solutions the sources show; none at first.
-    pub surfaces: Vec<Vec<SlantedPlane>>,
+    pub surfaces: Vec<Vec<ShownPlane>>,
 }
 
 /// Unit normal of the wall, which goes through (0, 0, 5).

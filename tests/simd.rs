@@ -68,6 +68,7 @@ impl Operation for Arithmetic {
             simd.sqrt(a),
             simd.splat(f32::from(simd.at_least(a, b))),
             simd.sums(&[a, b, c, a, b, c, a, b]),
+            simd.select(0b1010_0110, a, b),
         ];
         results.map(|lanes| simd.store(lanes)).to_vec()
     }
@@ -79,6 +80,26 @@ struct Whole(Lanes);
 impl Operation for Whole {
     fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
         vec![simd.store(simd.whole(simd.load(&self.0)))]
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Largest(Lanes);
+
+impl Operation for Largest {
+    fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
+        vec![[simd.largest(simd.load(&self.0)); LANES]]
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Places<'a>(&'a [i32; LANES], Lanes, Lanes);
+
+impl Operation for Places<'_> {
+    fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
+        let places = simd.places(self.0, simd.load(&self.1), simd.load(&self.2));
+        // Their bits: f32 does not hold every u32.
+        vec![places.map(f32::from_bits)]
     }
 }
 
@@ -147,6 +168,25 @@ proptest! {
     }
 
     #[test]
+    fn the_largest_lane_is_found_in_any_place(lanes in prop::array::uniform8(-1e9..1e9f32)) {
+        check(Largest(lanes))?;
+        let largest = lanes.into_iter().fold(f32::MIN, f32::max);
+        prop_assert_eq!(Largest(lanes).run(Scalar), vec![[largest; LANES]]);
+    }
+
+    #[test]
+    fn places_count_along_the_rows_of_each_lane_s_image(
+        strides in prop::array::uniform8(0..50_000i32),
+        x in whole_lanes(50_000),
+        y in whole_lanes(40_000),
+    ) {
+        check(Places(&strides, x, y))?;
+        let expected: [u32; LANES] =
+            std::array::from_fn(|lane| y[lane] as u32 * strides[lane] as u32 + x[lane] as u32);
+        prop_assert_eq!(Scalar.places(&strides, x, y), expected);
+    }
+
+    #[test]
     fn gathered_bytes_are_those_of_two_pairs_also_beyond_the_end(
         pairs in prop::collection::vec(any::<u16>(), 2..60),
         stride in 1..20usize,
@@ -185,6 +225,12 @@ fn the_larger_and_smaller_of_what_is_not_a_number_is_the_second() {
 }
 
 #[test]
+fn lanes_are_selected_by_their_bits_the_first_by_the_lowest() {
+    let (a, b) = ([1.0; LANES], [2.0; LANES]);
+    assert_eq!(Scalar.select(0b0000_0101, a, b), [1.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0]);
+}
+
+#[test]
 fn lanes_are_added_in_the_documented_tree() {
     let l = [1e8, 3.0, -1e8, 0.1, 7.0, -2.5, 1.0, 1e-3];
     let tree = ((l[0] + l[4]) + (l[2] + l[6])) + ((l[1] + l[5]) + (l[3] + l[7]));
@@ -200,9 +246,13 @@ fn there_are_levels_and_the_last_is_the_best_of_the_machine() {
     // A machine whose AVX2 goes unused must not pass for tested.
     #[cfg(target_arch = "x86_64")]
     {
-        assert_eq!(Level::X86V3.is_available(), std::is_x86_feature_detected!("avx2"));
+        let has_v3 = std::is_x86_feature_detected!("avx2")
+            && std::is_x86_feature_detected!("bmi1")
+            && std::is_x86_feature_detected!("bmi2")
+            && std::is_x86_feature_detected!("popcnt");
+        assert_eq!(Level::X86V3.is_available(), has_v3);
         if std::env::var_os("SKEP_SIMD").is_none() {
-            let best = if std::is_x86_feature_detected!("avx2") { Level::X86V3 } else { Level::Base };
+            let best = if has_v3 { Level::X86V3 } else { Level::Base };
             assert_eq!(Level::detect(), best);
         }
     }

@@ -7,10 +7,10 @@ use glam::{DVec3, Vec3};
 use skep::camera::Camera;
 use skep::image::{PackedImage, Picture};
 use skep::kernels::{PatchHomography, SlantedPlane};
-use skep::simd::{LANES, Level, Simd, Task, dispatch};
+use skep::simd::{LANES, Level, Scalar, Simd, Task, dispatch};
 use skep::views::{
-    Placed, Placements, Reference, Source, SourceLists, ViewRules, ViewSets, faces_source, is_occluded,
-    source_lists,
+    Placed, Placements, Reference, ShownPlane, Source, SourceLists, ViewRules, ViewSelector, ViewSets,
+    are_occluded, faces_sources, source_lists,
 };
 use skep::{DepthRange, Options, Scene, SparsePoint, View};
 
@@ -38,7 +38,7 @@ struct Views {
     reference: Camera,
     sources: Vec<Camera>,
     /// The validated solutions of each source.
-    surfaces: Vec<Vec<SlantedPlane>>,
+    surfaces: Vec<Vec<ShownPlane>>,
 }
 
 impl Views {
@@ -59,7 +59,8 @@ impl Views {
         reference.sources =
             sources.map(|(camera, s)| Source::new(&self.reference, camera, &self.image, s)).collect();
         let mut words = vec![0u32; self.sources.len().div_ceil(32)];
-        ViewRules::new(options, min_views).select(&reference, &mut words, CENTRE, DEPTH, normal);
+        let rules = ViewRules::new(options, min_views);
+        ViewSelector::new(Scalar, &reference, rules).select(&mut words, CENTRE, DEPTH, normal);
         let bit = |place: &usize| words[place / 32] >> (place % 32) & 1 != 0;
         (0..32 * words.len()).filter(bit).collect()
     }
@@ -83,9 +84,13 @@ fn a_source_at_grazing_incidence_is_left_out() {
 fn a_surface_seen_from_behind_faces_nobody() {
     let normal = Vec3::new(0.0, 0.6, -0.8);
     let point = Vec3::new(1.0, 2.0, 5.0);
-    assert!(faces_source(point, normal, point + normal * 3.0, 0.99));
-    assert!(!faces_source(point, normal, point - normal * 3.0, 0.0));
-    assert!(!faces_source(point, normal, point - normal * 3.0, 0.17));
+    let faces = |centre: Vec3, min_cosine: f32| {
+        let centres = centre.to_array().map(|coordinate| Scalar.splat(coordinate));
+        faces_sources(Scalar, point, normal, &centres, min_cosine)
+    };
+    assert_eq!(faces(point + normal * 3.0, 0.99), 0xff);
+    assert_eq!(faces(point - normal * 3.0, 0.0), 0);
+    assert_eq!(faces(point - normal * 3.0, 0.17), 0);
 }
 
 #[test]
@@ -93,9 +98,9 @@ fn a_validated_surface_in_front_hides_the_point_from_its_view() {
     let mut views = Views::at_angles(&[10.0; 5]);
     let nearest = CENTRE.1 as usize * WIDTH + CENTRE.0 as usize;
     for (surface, factor) in views.surfaces.iter_mut().zip([0.5, 0.985, 0.995, 1.0, 1.5]) {
-        let none = SlantedPlane { inverse_depth: 0.0, slope_x: 0.0, slope_y: 0.0 };
-        *surface = vec![none; WIDTH * HEIGHT];
-        surface[nearest].inverse_depth = 1.0 / (DEPTH * factor);
+        *surface = vec![ShownPlane::default(); WIDTH * HEIGHT];
+        let inverse_depth = 1.0 / (DEPTH * factor);
+        surface[nearest] = SlantedPlane { inverse_depth, slope_x: 0.0, slope_y: 0.0 }.into();
     }
     let options = Options { occlusion_margin: 0.01, ..Options::default() };
     assert_eq!(views.set(&options, 0, FACING), [2, 3, 4]);
@@ -103,7 +108,7 @@ fn a_validated_surface_in_front_hides_the_point_from_its_view() {
     assert_eq!(views.set(&wide, 0, FACING), [1, 2, 3, 4]);
     // A view that found nothing hides nothing.
     for surface in &mut views.surfaces {
-        surface[nearest].inverse_depth = 0.0;
+        surface[nearest] = ShownPlane::default();
     }
     assert_eq!(views.set(&options, 0, FACING), [0, 1, 2, 3, 4]);
 }
@@ -111,9 +116,9 @@ fn a_validated_surface_in_front_hides_the_point_from_its_view() {
 #[test]
 fn the_occlusion_margin_is_relative() {
     for scale in [1.0, 1000.0] {
-        assert!(is_occluded(scale, 0.98 * scale, 0.01));
-        assert!(!is_occluded(scale, 0.995 * scale, 0.01));
-        assert!(!is_occluded(scale, 1.1 * scale, 0.01));
+        let factors = [0.5, 0.98, 0.995, 1.0, 1.1, 2.0, 1e6, f32::INFINITY];
+        let validated = factors.map(|factor| 1.0 / (factor * scale));
+        assert_eq!(are_occluded(Scalar, Scalar.splat(scale), validated, 0.01), 0b11);
     }
 }
 

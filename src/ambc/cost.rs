@@ -9,6 +9,7 @@ use crate::options::{Aggregation, Options};
 use crate::simd::{LANES, Simd};
 use crate::views::{Group, Placed, Placements, Reference, ViewSets};
 use glam::Vec3;
+use std::cmp::Ordering;
 
 type Lanes = [f32; LANES];
 
@@ -50,21 +51,25 @@ impl CostRules {
     /// What a hypothesis of this depth costs in the views of a group by disagreeing with their validated depths: bounded,
     /// so that a wrong neighbour cannot rule out a good match.
     #[inline(always)]
-    fn geometric_costs(&self, reference: &Reference, group: &Group, placed: &Placed, depth: f32) -> Lanes {
-        let mut costs = [0.0; LANES];
+    fn geometric_costs<S: Simd>(
+        &self,
+        simd: S,
+        reference: &Reference,
+        group: &Group,
+        placed: &Placed,
+        depth: f32,
+    ) -> Lanes {
         if self.geometric_weight == 0.0 {
-            return costs;
+            return [0.0; LANES];
         }
-        for (lane, &source) in group.sources().iter().enumerate() {
-            let source = &reference.sources[source];
-            let (x, y, z) = (placed.column[lane], placed.row[lane], placed.centre[2][lane]);
-            let disagreement = match source.validated_at(x, y) {
-                Some(validated) => smaller((depth * z * validated.exact - 1.0).abs(), self.geometric_limit),
-                None => self.geometric_unknown,
-            };
-            costs[lane] = self.geometric_weight * disagreement;
-        }
-        costs
+        let surfaces = group.surfaces(simd, reference, placed);
+        let depth_there = simd.mul(simd.splat(depth), simd.load(&placed.centre[2]));
+        let one = simd.splat(1.0);
+        let difference = simd.sub(simd.mul(depth_there, simd.load(&surfaces.exact)), one);
+        let difference = simd.max(difference, simd.sub(simd.splat(0.0), difference));
+        let bounded = simd.min(difference, simd.splat(self.geometric_limit));
+        let disagreement = simd.select(surfaces.known, bounded, simd.splat(self.geometric_unknown));
+        simd.store(simd.mul(simd.splat(self.geometric_weight), disagreement))
     }
 }
 
@@ -176,14 +181,6 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         if cost < bound { cost } else { f32::INFINITY }
     }
 
-    /// Tries the plane in the middle of the neighbours' for the best food source.
-    #[inline(always)]
-    pub fn try_middle(&mut self, food: &mut FoodSource) {
-        if let Some(middle) = self.surroundings.middle(self.ray) {
-            self.challenge(food, &middle, 0.0);
-        }
-    }
-
     /// Puts `trial` in the place of a food source if it is better; `reward` is a bonus on its fitness.
     #[inline(always)]
     pub fn challenge(&mut self, food: &mut FoodSource, trial: &FoodSource, reward: f32) -> bool {
@@ -244,23 +241,19 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         let is_matched = all > count && agreeing < count;
         if is_matched {
             let plane = food.plane(self.reference, self.ray);
-            (0..self.views.len()).for_each(|group| self.add_photometric_costs(&plane, group));
+            for group in 0..self.views.len() {
+                self.add_photometric_costs(&plane, group);
+            }
         }
         let kept = all.min(count);
         if kept >= self.rules.min_views {
             set.fill(0);
-            for _ in 0..kept {
-                let mut best = (f32::INFINITY, 0, 0);
-                for (group, InViews { placed, least }) in self.views.iter().enumerate() {
-                    for (lane, &cost) in least.iter().enumerate() {
-                        let source = self.placements.groups()[group].sources().get(lane).copied();
-                        let is_free = source.is_some_and(|source| !ViewSets::holds(set, source));
-                        if placed.inside >> lane & 1 != 0 && is_free && cost < best.0 {
-                            best = (cost, group, lane);
-                        }
+            for group in 0..self.views.len() {
+                for (lane, &source) in self.placements.groups()[group].sources().iter().enumerate() {
+                    if self.cheaper(group, lane) < kept && self.views[group].placed.inside >> lane & 1 != 0 {
+                        ViewSets::insert_into(set, source);
                     }
                 }
-                ViewSets::insert_into(set, self.placements.groups()[best.1].sources()[best.2]);
             }
             // What was matched to choose the views is not matched again.
             for (group, view) in self.placements.groups().iter().zip(&mut self.views) {
@@ -271,10 +264,30 @@ impl<'a, S: Simd> Evaluator<'a, S> {
             self.placements.keep(set);
             if let (Aggregation::BestViews(best), true) = (self.rules.aggregation, is_matched) {
                 let best = (best as usize).min(kept);
-                return sum_of_least(&self.views, kept, best) / best as f32;
+                return self.sum_of_least(kept, best) / best as f32;
             }
         }
         self.cost(food, f32::INFINITY)
+    }
+
+    /// The number of views in which the hypothesis costs less than in this one; of equals the earlier cost less.
+    #[inline(always)]
+    fn cheaper(&self, group: usize, lane: usize) -> usize {
+        let simd = self.simd;
+        let cost = simd.splat(self.views[group].least[lane]);
+        let mut count = 0;
+        for (other, InViews { placed, least }) in self.views.iter().enumerate() {
+            let costs = simd.load(least);
+            let not_less = simd.at_least(costs, cost);
+            let earlier = match other.cmp(&group) {
+                Ordering::Less => u8::MAX,
+                Ordering::Equal => (1 << lane) - 1,
+                Ordering::Greater => 0,
+            };
+            let equal = not_less & simd.at_least(cost, costs);
+            count += ((!not_less | equal & earlier) & placed.inside).count_ones() as usize;
+        }
+        count
     }
 
     /// Finds where a hypothesis falls in the views of the set. A view whose image its centre leaves does not count.
@@ -284,7 +297,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         views.clear();
         for group in placements.groups() {
             let placed = group.place(*simd, food.depth);
-            let least = rules.geometric_costs(reference, group, &placed, food.depth);
+            let least = rules.geometric_costs(*simd, reference, group, &placed, food.depth);
             views.push(InViews { placed, least });
         }
     }
@@ -329,13 +342,13 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         let plane = food.plane(self.reference, self.ray);
         let divisor = (count - 1) as f32;
         for group in 0..self.views.len() {
-            if sum(&self.views) >= bound * divisor {
+            if self.sum() >= bound * divisor {
                 self.counts.early_outs += 1;
                 return f32::INFINITY;
             }
             self.add_photometric_costs(&plane, group);
         }
-        sum(&self.views) / divisor
+        self.sum() / divisor
     }
 
     /// The mean over the best views of the set; views that cannot see the point do not raise it.
@@ -348,56 +361,59 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         let plane = food.plane(self.reference, self.ray);
         let best = best.min(count);
         let limit = bound * best as f32;
+        let (mut unmatched, is_guided) = (count, self.rules.geometric_weight > 0.0);
         for group in 0..self.views.len() {
-            if sum_of_least(&self.views, count, best) >= limit {
+            // Views that are not matched yet and cost nothing else leave nothing to sum.
+            if (is_guided || unmatched < best || limit <= 0.0) && self.sum_of_least(count, best) >= limit {
                 self.counts.early_outs += 1;
                 return f32::INFINITY;
             }
             self.add_photometric_costs(&plane, group);
+            unmatched -= self.views[group].placed.inside.count_ones() as usize;
         }
-        sum_of_least(&self.views, count, best) / best as f32
+        self.sum_of_least(count, best) / best as f32
     }
-}
 
-/// The costs in the views that have the hypothesis in their image.
-#[inline(always)]
-fn sum(views: &[InViews]) -> f32 {
-    let mut sum = 0.0;
-    for InViews { placed, least } in views {
-        for (lane, cost) in least.iter().enumerate() {
-            sum += if placed.inside >> lane & 1 != 0 { *cost } else { 0.0 };
+    /// The costs in the views that have the hypothesis in their image.
+    #[inline(always)]
+    fn sum(&self) -> f32 {
+        let zero = self.simd.splat(0.0);
+        let mut sum = zero;
+        for InViews { placed, least } in &self.views {
+            sum = self.simd.add(sum, self.simd.select(placed.inside, self.simd.load(least), zero));
         }
+        self.simd.sum(sum)
     }
-    sum
-}
 
-/// The sum of the `best` smallest of those `count` costs.
-#[inline(always)]
-fn sum_of_least(views: &[InViews], count: usize, best: usize) -> f32 {
-    if count == best {
-        return sum(views);
-    }
-    if count == best + 1 {
-        let mut largest = 0.0;
-        for InViews { placed, least } in views {
-            for (lane, &cost) in least.iter().enumerate() {
-                largest = larger(largest, if placed.inside >> lane & 1 != 0 { cost } else { 0.0 });
+    /// The sum of the `best` smallest of those `count` costs.
+    #[inline(always)]
+    fn sum_of_least(&self, count: usize, best: usize) -> f32 {
+        if count == best {
+            return self.sum();
+        }
+        if count == best + 1 {
+            let zero = self.simd.splat(0.0);
+            let mut largest = zero;
+            for InViews { placed, least } in &self.views {
+                largest =
+                    self.simd.max(largest, self.simd.select(placed.inside, self.simd.load(least), zero));
             }
+            return self.sum() - self.simd.largest(largest);
         }
-        return sum(views) - largest;
-    }
-    match best {
-        1 => sum_of::<1>(views),
-        2 => sum_of::<2>(views),
-        3 => sum_of::<3>(views),
-        4 => sum_of::<4>(views),
-        5 => sum_of::<5>(views),
-        6 => sum_of::<6>(views),
-        7 => sum_of::<7>(views),
-        _ => sum_of::<MAX_BEST_VIEWS>(views),
+        match best {
+            1 => sum_of::<1>(&self.views),
+            2 => sum_of::<2>(&self.views),
+            3 => sum_of::<3>(&self.views),
+            4 => sum_of::<4>(&self.views),
+            5 => sum_of::<5>(&self.views),
+            6 => sum_of::<6>(&self.views),
+            7 => sum_of::<7>(&self.views),
+            _ => sum_of::<MAX_BEST_VIEWS>(&self.views),
+        }
     }
 }
 
+/// The sum of the smallest costs in the views that have the hypothesis in their image.
 #[inline(always)]
 fn sum_of<const BEST: usize>(views: &[InViews]) -> f32 {
     let mut least = [f32::INFINITY; BEST];

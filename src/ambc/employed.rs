@@ -5,11 +5,16 @@ use super::food::{FoodSource, MIN_FACING};
 use super::random::Random;
 use crate::simd::Simd;
 
-/// Perturbs every food source towards or away from another one of the colony, `y' = y + R(-1,1) (y_n - y)`, in depth or
+/// Perturbs the first `count` food sources towards or away from another one of the colony, `y' = y + R(-1,1) (y_n - y)`, in depth or
 /// in normal with equal chance, and keeps what is better.
 #[inline(always)]
-pub fn send<S: Simd>(evaluator: &mut Evaluator<S>, foods: &mut [FoodSource], random: &mut Random) {
-    for index in 0..foods.len() {
+pub fn send<S: Simd>(
+    evaluator: &mut Evaluator<S>,
+    foods: &mut [FoodSource],
+    count: usize,
+    random: &mut Random,
+) {
+    for index in 0..foods.len().min(count) {
         let other = (index + 1 + random.below(foods.len() - 1)) % foods.len();
         let (food, other) = (foods[index], foods[other]);
         let trial = perturb(evaluator, &food, &other, random);

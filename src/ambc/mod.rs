@@ -3,6 +3,7 @@
 mod colony;
 mod cost;
 mod employed;
+mod fitted;
 mod food;
 mod onlooker;
 mod random;
@@ -15,5 +16,6 @@ mod tests;
 pub use colony::Offer;
 pub use cost::CostRules;
 pub use food::{FoodSource, MIN_FACING};
+pub use onlooker::OnlookerRules;
 pub use random::{Random, stream};
 pub use schedule::{Assessment, BAND_ROWS, Search, assess};

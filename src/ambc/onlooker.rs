@@ -31,6 +31,15 @@ pub const OFFSETS: [(i32, i32); 20] = [
     (-2, -1),
 ];
 
+/// How onlookers choose.
+#[derive(Debug, Clone, Copy)]
+pub struct OnlookerRules {
+    /// Fitness reward of validated planes (section 5.6).
+    pub reward: f32,
+    /// Random neighbours of which the one of the cheapest plane is visited; the paper's onlookers take the first.
+    pub draws: u32,
+}
+
 /// Offers every food source the best plane of a random neighbour of the other colour, transferred to this pixel, and
 /// keeps what is better. A validated plane is rewarded in that comparison (section 5.6).
 #[inline(always)]
@@ -39,21 +48,47 @@ pub fn send<S: Simd>(
     foods: &mut [FoodSource],
     neighbours: &Colonies,
     (x, y): (usize, usize),
-    reward: f32,
+    rules: OnlookerRules,
     random: &mut Random,
 ) {
     for food in foods {
-        let offer = draw_neighbour(neighbours, x, y, random)
+        let offer = draw_best(neighbours, (x, y), rules.draws, random)
             .and_then(|(dx, dy)| brought(evaluator, neighbours, (x, y), (dx, dy)))
             .filter(|offer| !is_same_plane(food, offer));
         let improved = match offer {
-            Some(offer) => evaluator.challenge(food, &offer, if offer.validated { reward } else { 0.0 }),
+            Some(offer) => {
+                evaluator.challenge(food, &offer, if offer.validated { rules.reward } else { 0.0 })
+            }
             None => false,
         };
         if !improved {
             food.trials = food.trials.saturating_add(1);
         }
     }
+}
+
+/// The offset of the cheapest plane among so many random neighbours; of equals the first.
+#[inline(always)]
+fn draw_best(
+    colonies: &Colonies,
+    (x, y): (usize, usize),
+    draws: u32,
+    random: &mut Random,
+) -> Option<(i32, i32)> {
+    let mut best = draw_neighbour(colonies, x, y, random)?;
+    let cost = |(dx, dy): (i32, i32)| {
+        let food = colonies.best(x.wrapping_add_signed(dx as isize), y.wrapping_add_signed(dy as isize));
+        // A neighbour that is masked or was never evaluated has nothing to offer.
+        if food.depth > 0.0 { food.cost } else { f32::INFINITY }
+    };
+    for _ in 1..draws {
+        if let Some(other) = draw_neighbour(colonies, x, y, random)
+            && cost(other) < cost(best)
+        {
+            best = other;
+        }
+    }
+    Some(best)
 }
 
 /// A random offset to a pixel inside the image: at a border the offset is mirrored, in tiny images there may be none.

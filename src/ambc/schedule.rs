@@ -3,7 +3,9 @@
 
 use super::colony::{Colonies, Offer, colour};
 use super::cost::{CostRules, Evaluator};
+use super::fitted::fitted;
 use super::food::FoodSource;
+use super::onlooker::OnlookerRules;
 use super::random::{Random, stream};
 use super::{employed, onlooker, scout};
 use crate::error::{Error, Result};
@@ -11,7 +13,7 @@ use crate::kernels::{MAX_COST, Window};
 use crate::maps::Counts;
 use crate::simd::{Level, Simd, Task, dispatch};
 use crate::state::Solution;
-use crate::views::{Reference, ViewRules, ViewSets};
+use crate::views::{Reference, ViewRules, ViewSelector, ViewSets};
 use rayon::prelude::*;
 
 /// Rows of a band, the unit of work of a thread.
@@ -41,8 +43,12 @@ pub struct Search<'a> {
     pub iterations: u32,
     /// Trials after which a scout bee may replace a food source.
     pub trial_limit: u16,
-    /// Fitness reward of validated planes.
-    pub reward: f32,
+    /// Food sources of each colony, the best first, that employed bees work on.
+    pub employed_foods: usize,
+    /// How onlookers choose.
+    pub onlookers: OnlookerRules,
+    /// Relative difference of inverse depth up to which a neighbour's depth continues a plane; 0 fits no planes.
+    pub plane_fit: f32,
     /// Views kept for the whole search; 0 keeps all.
     pub focused_views: usize,
     /// Relative spread and tilt of foods around the start; spread 0 draws them at random.
@@ -164,6 +170,7 @@ fn initialise<S: Simd>(
             #[inline(always)]
             || {
                 let mut evaluator = Evaluator::new(simd, search.reference, search.window, search.cost_rules);
+                let mut selector = ViewSelector::new(simd, search.reference, search.view_rules);
                 let rows = BAND_ROWS.min(height - band * BAND_ROWS);
                 for (x, row) in tiled(width, rows) {
                     let y = band * BAND_ROWS + row;
@@ -175,7 +182,14 @@ fn initialise<S: Simd>(
                     let foods = if colour(x, y) == 0 { &mut *first } else { &mut *second };
                     let colony = &mut foods[row * row_foods + x / 2 * search.foods..][..search.foods];
                     let mut random = Random::new(search.stream, (y * width + x) as u64);
-                    fill_colony(search, &mut evaluator, colony, (set, focus), (x, y), &mut random);
+                    fill_colony(
+                        search,
+                        (&mut evaluator, &mut selector),
+                        colony,
+                        (set, focus),
+                        (x, y),
+                        &mut random,
+                    );
                     weak[row * width + x] = evaluator.is_weak();
                 }
                 evaluator.counts
@@ -189,7 +203,7 @@ fn initialise<S: Simd>(
 #[inline(always)]
 fn fill_colony<S: Simd>(
     search: &Search,
-    evaluator: &mut Evaluator<S>,
+    (evaluator, selector): (&mut Evaluator<S>, &mut ViewSelector<S>),
     colony: &mut [FoodSource],
     (set, focus): (&mut [u32], &mut [u32]),
     (x, y): (usize, usize),
@@ -199,7 +213,7 @@ fn fill_colony<S: Simd>(
     let pixel = y * search.width() + x;
     let start = search.start.map(|start| start[pixel]).filter(|start| start.depth > 0.0);
     if let Some(start) = start {
-        search.view_rules.select(reference, set, (x as f32, y as f32), start.depth, start.normal);
+        selector.select(set, (x as f32, y as f32), start.depth, start.normal);
     }
     evaluator.go_to(x, y, set);
     let ray = evaluator.ray();
@@ -281,9 +295,9 @@ fn iterate<S: Simd>(
                     evaluator.go_to(x, y, focus.words_of(pixel));
                     evaluator.look_around(neighbours, (x, y));
                     evaluator.best_first(colony);
-                    evaluator.try_middle(&mut colony[0]);
-                    employed::send(&mut evaluator, colony, &mut random);
-                    onlooker::send(&mut evaluator, colony, neighbours, (x, y), search.reward, &mut random);
+                    try_fitted(search, &mut evaluator, &mut colony[0], neighbours, (x, y));
+                    employed::send(&mut evaluator, colony, search.employed_foods, &mut random);
+                    onlooker::send(&mut evaluator, colony, neighbours, (x, y), search.onlookers, &mut random);
                     evaluator.best_first(colony);
                     scout::send(&mut evaluator, colony, search.trial_limit, &mut random);
                     evaluator.best_first(colony);
@@ -292,6 +306,22 @@ fn iterate<S: Simd>(
             },
         ))
     }))
+}
+
+/// Tries, for the best food source, the plane fitted to the depths around the pixel.
+#[inline(always)]
+fn try_fitted<S: Simd>(
+    search: &Search,
+    evaluator: &mut Evaluator<S>,
+    best: &mut FoodSource,
+    neighbours: &Colonies,
+    at: (usize, usize),
+) {
+    if search.plane_fit > 0.0
+        && let Some(trial) = fitted(search.reference, neighbours, at, best, search.plane_fit)
+    {
+        evaluator.challenge(best, &trial, 0.0);
+    }
 }
 
 /// What is known of the final solutions of a view.
@@ -340,6 +370,7 @@ impl Task for AssessTask<'_> {
                 || {
                     let mut evaluator =
                         Evaluator::new(simd, search.reference, search.window, search.cost_rules);
+                    let mut selector = ViewSelector::new(simd, search.reference, search.view_rules);
                     for place in 0..cost.len() {
                         let pixel = index * band + place;
                         let (x, y) = (pixel % width, pixel / width);
@@ -348,7 +379,7 @@ impl Task for AssessTask<'_> {
                             continue;
                         }
                         let set = &mut sets[place * words..][..words];
-                        search.view_rules.select(search.reference, set, (x as f32, y as f32), depth, normal);
+                        selector.select(set, (x as f32, y as f32), depth, normal);
                         evaluator.go_to(x, y, set);
                         cost[place] = evaluator.mean_photometric_cost(&FoodSource::new(depth, normal));
                         textured[place] = evaluator.has_texture() && !evaluator.is_weak();

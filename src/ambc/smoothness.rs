@@ -2,7 +2,7 @@
 //! say where the surface of a pixel should be.
 
 use super::colony::Colonies;
-use super::food::{FoodSource, MIN_FACING};
+use super::food::FoodSource;
 use crate::kernels::Window;
 use crate::views::Reference;
 use glam::Vec3;
@@ -78,20 +78,6 @@ impl Surroundings {
                 self.count += 1;
             }
         }
-    }
-
-    /// The plane in the middle of what the neighbours predict.
-    #[inline(always)]
-    pub fn middle(&self, ray: Vec3) -> Option<FoodSource> {
-        let (mut inverse_depth, mut normal, mut weight) = (0.0, Vec3::ZERO, 0.0);
-        for prediction in &self.predictions[..self.count] {
-            inverse_depth += prediction.weight / prediction.depth;
-            normal += prediction.weight * prediction.normal;
-            weight += prediction.weight;
-        }
-        let normal = normal.normalize_or_zero();
-        let valid = self.count > 1 && inverse_depth > 0.0 && normal.dot(ray) < -MIN_FACING;
-        valid.then(|| FoodSource { validated: true, ..FoodSource::new(weight / inverse_depth, normal) })
     }
 
     /// What a food source's disagreement with the neighbours costs.

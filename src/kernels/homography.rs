@@ -28,6 +28,16 @@ impl SlantedPlane {
         }
     }
 
+    /// What [`SlantedPlane::new`] makes it of: depth on the ray, and unit normal that faces the camera.
+    #[inline(always)]
+    pub fn depth_and_normal(&self, ray: Vec3, inverse_focal: (f32, f32)) -> (f32, Vec3) {
+        let depth = 1.0 / self.inverse_depth;
+        // The normal over its product with the ray.
+        let (x, y) = (self.slope_x * depth / inverse_focal.0, self.slope_y * depth / inverse_focal.1);
+        let normal = -Vec3::new(x, y, 1.0 - x * ray.x - y * ray.y);
+        (depth, normal.normalize_or_zero())
+    }
+
     /// Inverse depth at an offset in pixels.
     #[inline(always)]
     pub fn inverse_depth_at(&self, dx: f32, dy: f32) -> f32 {

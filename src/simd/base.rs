@@ -62,8 +62,18 @@ impl Simd for Base {
     }
 
     #[inline(always)]
+    fn select(self, bits: u8, a: f32x8, b: f32x8) -> f32x8 {
+        f32x8::new(Scalar.select(bits, a.to_array(), b.to_array()))
+    }
+
+    #[inline(always)]
     fn whole(self, a: f32x8) -> f32x8 {
         a.trunc()
+    }
+
+    #[inline(always)]
+    fn places(self, strides: &[i32; LANES], x: f32x8, y: f32x8) -> [u32; LANES] {
+        Scalar.places(strides, x.to_array(), y.to_array())
     }
 
     // `wide` has no gather: lanes are read one by one.
@@ -80,6 +90,11 @@ impl Simd for Base {
     #[inline(always)]
     fn sum(self, a: f32x8) -> f32 {
         Scalar.sum(a.to_array())
+    }
+
+    #[inline(always)]
+    fn largest(self, a: f32x8) -> f32 {
+        Scalar.largest(a.to_array())
     }
 
     #[inline(always)]

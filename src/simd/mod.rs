@@ -46,8 +46,12 @@ pub trait Simd: Copy + Send + Sync {
     fn min(self, a: Self::F32, b: Self::F32) -> Self::F32;
     /// `a >= b` as bits, the first lane in the lowest; not where a lane is not a number.
     fn at_least(self, a: Self::F32, b: Self::F32) -> u8;
+    /// `a` in the lanes whose bits are set, the first lane's the lowest; `b` in the others.
+    fn select(self, bits: u8, a: Self::F32, b: Self::F32) -> Self::F32;
     /// The whole part of lanes in [0, 2^24).
     fn whole(self, a: Self::F32) -> Self::F32;
+    /// `y * stride + x` for whole, non-negative lanes, with a stride for each.
+    fn places(self, strides: &[i32; LANES], x: Self::F32, y: Self::F32) -> [u32; LANES];
     /// The four bytes, lowest first, of the pairs at `y * stride + x` and after it, for whole, non-negative `x` and `y`.
     /// An index beyond the last two pairs reads those; there must be two.
     fn gather_bytes(self, pairs: &[u16], stride: usize, x: Self::F32, y: Self::F32) -> [Self::F32; 4];
@@ -55,6 +59,8 @@ pub trait Simd: Copy + Send + Sync {
     fn look_up(self, table: &[f32; 256], a: Self::F32) -> Self::F32;
     /// The sum of the lanes, as `((l0 + l4) + (l2 + l6)) + ((l1 + l5) + (l3 + l7))`.
     fn sum(self, a: Self::F32) -> f32;
+    /// The largest lane; no lane may be anything else than a number.
+    fn largest(self, a: Self::F32) -> f32;
     /// The square root.
     fn sqrt(self, a: Self::F32) -> Self::F32;
     /// The sums of eight vectors, as [`Simd::sum`] adds them, one a lane.

@@ -62,8 +62,18 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
+    fn select(self, bits: u8, a: Self::F32, b: Self::F32) -> Self::F32 {
+        from_fn(|lane| if bits >> lane & 1 != 0 { a[lane] } else { b[lane] })
+    }
+
+    #[inline(always)]
     fn whole(self, a: Self::F32) -> Self::F32 {
         from_fn(|lane| a[lane] as i32 as f32)
+    }
+
+    #[inline(always)]
+    fn places(self, strides: &[i32; LANES], x: Self::F32, y: Self::F32) -> [u32; LANES] {
+        from_fn(|lane| (y[lane] as i32).wrapping_mul(strides[lane]).wrapping_add(x[lane] as i32) as u32)
     }
 
     #[inline(always)]
@@ -84,6 +94,11 @@ impl Simd for Scalar {
     #[inline(always)]
     fn sum(self, l: Self::F32) -> f32 {
         ((l[0] + l[4]) + (l[2] + l[6])) + ((l[1] + l[5]) + (l[3] + l[7]))
+    }
+
+    #[inline(always)]
+    fn largest(self, a: Self::F32) -> f32 {
+        a.into_iter().fold(f32::NEG_INFINITY, |most, lane| if lane > most { lane } else { most })
     }
 
     #[inline(always)]

@@ -9,9 +9,13 @@ use core::arch::x86_64::*;
 pub struct X86V3(());
 
 impl X86V3 {
-    /// The token, on a machine that has AVX2.
+    /// The token, on a machine that has AVX2 and what comes with it: counting and finding bits.
     pub fn new() -> Option<X86V3> {
-        is_x86_feature_detected!("avx2").then_some(X86V3(()))
+        let has_all = is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2")
+            && is_x86_feature_detected!("popcnt");
+        has_all.then_some(X86V3(()))
     }
 }
 
@@ -105,9 +109,32 @@ impl Simd for X86V3 {
     }
 
     #[inline(always)]
+    fn select(self, bits: u8, a: __m256, b: __m256) -> __m256 {
+        // SAFETY: AVX2 is there.
+        unsafe {
+            let lane_bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let set = _mm256_and_si256(_mm256_set1_epi32(i32::from(bits)), lane_bits);
+            _mm256_blendv_ps(b, a, _mm256_castsi256_ps(_mm256_cmpeq_epi32(set, lane_bits)))
+        }
+    }
+
+    #[inline(always)]
     fn whole(self, a: __m256) -> __m256 {
         // SAFETY: AVX is there.
         unsafe { _mm256_round_ps::<{ _MM_FROUND_TO_ZERO | _MM_FROUND_NO_EXC }>(a) }
+    }
+
+    #[inline(always)]
+    fn places(self, strides: &[i32; LANES], x: __m256, y: __m256) -> [u32; LANES] {
+        let mut places = [0; LANES];
+        // SAFETY: AVX2 is there; the arrays hold the eight integers that are read and written, aligned or not.
+        unsafe {
+            let strides = _mm256_loadu_si256(strides.as_ptr().cast());
+            let row = _mm256_mullo_epi32(_mm256_cvttps_epi32(y), strides);
+            let place = _mm256_add_epi32(row, _mm256_cvttps_epi32(x));
+            _mm256_storeu_si256(places.as_mut_ptr().cast(), place);
+        }
+        places
     }
 
     #[inline(always)]
@@ -155,6 +182,16 @@ impl Simd for X86V3 {
     }
 
     #[inline(always)]
+    fn largest(self, a: __m256) -> f32 {
+        // SAFETY: AVX is there.
+        unsafe {
+            let four = _mm_max_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps::<1>(a));
+            let two = _mm_max_ps(four, _mm_movehl_ps(four, four));
+            _mm_cvtss_f32(_mm_max_ss(two, _mm_shuffle_ps::<1>(two, two)))
+        }
+    }
+
+    #[inline(always)]
     fn sqrt(self, a: __m256) -> __m256 {
         // SAFETY: AVX is there.
         unsafe { _mm256_sqrt_ps(a) }
@@ -178,11 +215,11 @@ impl Simd for X86V3 {
 
     #[inline(always)]
     fn vectorize<R>(self, f: impl FnOnce() -> R) -> R {
-        #[target_feature(enable = "avx2")]
+        #[target_feature(enable = "avx2,bmi1,bmi2,popcnt")]
         fn with_avx2<R>(f: impl FnOnce() -> R) -> R {
             f()
         }
-        // SAFETY: AVX2 is there.
+        // SAFETY: `X86V3::new` has seen all four.
         unsafe { with_avx2(f) }
     }
 }

@@ -57,6 +57,7 @@ fn run(scene: &Scene, options: &Options, hook: Hook) -> Result<Reconstruction> {
         tracker.jump_to(work_before(next.unwrap_or(steps.all().len())));
     }
     let views = finish(&steps, &states, &tracker)?;
+    drop(states);
     let points = fuse(scene, options, &views, hook)?;
     Ok(Reconstruction { views, points, warnings: steps.warnings().to_vec() })
 }
@@ -77,6 +78,7 @@ fn cycle(steps: &Steps, step: usize, mut states: Vec<State>, tracker: &Tracker) 
         let offers = steps.propagate_with(step, view, &before, &|| advance(0))?;
         searched.push(steps.search_with(step, view, &before, Some(&offers), &advance)?);
     }
+    drop(states);
     let mut verdicts = Vec::with_capacity(views);
     for view in 0..views {
         let progress = steps.all()[step].progress(Phase::Check, view, views);
@@ -84,6 +86,7 @@ fn cycle(steps: &Steps, step: usize, mut states: Vec<State>, tracker: &Tracker) 
     }
     for ((view, state), verdicts) in searched.iter_mut().enumerate().zip(&verdicts) {
         steps.mark(view, state, verdicts)?;
+        state.forget_view_sets();
     }
     Ok(searched)
 }

@@ -2,7 +2,7 @@
 
 use super::prepare::Steps;
 use super::state::State;
-use crate::ambc::{BAND_ROWS, CostRules, FoodSource, Offer, Search, stream};
+use crate::ambc::{BAND_ROWS, CostRules, FoodSource, Offer, OnlookerRules, Search, stream};
 use crate::consistency::{self, ConsistencyRules};
 use crate::edges::trim;
 use crate::error::{Error, Result};
@@ -12,9 +12,10 @@ use crate::maps::CycleRecord;
 use crate::options::Aggregation;
 use crate::progress::{Cancelled, Hook, Phase, Tracker};
 use crate::propagation::{self, Giver};
+use crate::simd::Scalar;
 use crate::smoothing::smooth;
 use crate::state::{Solution, ViewState};
-use crate::views::{Reference, Source, ViewRules, ViewSets};
+use crate::views::{Reference, Source, ViewRules, ViewSelector, ViewSets};
 
 /// The planes other views offer to the pixels of a view; nothing on a scale's first cycle or with propagation off.
 #[derive(Debug, Clone)]
@@ -144,11 +145,13 @@ impl Steps {
             };
             let mut found = search.run()?;
             let words = found.sets.words_per_pixel();
+            // A few pixels, and every back-end gives the same bits.
+            let mut selector = ViewSelector::new(Scalar, &reference, search.view_rules);
             for pixel in fill(&reference, &mut found.best, &found.weak) {
                 let FoodSource { depth, normal, .. } = found.best[pixel];
                 let at = ((pixel % reference.image.width) as f32, (pixel / reference.image.width) as f32);
                 let set = &mut found.sets.words_mut()[pixel * words..][..words];
-                search.view_rules.select(&reference, set, at, depth, normal);
+                selector.select(set, at, depth, normal);
             }
             state.counts += found.counts;
             let solution = |food: &FoodSource| Solution {
@@ -259,12 +262,24 @@ impl Steps {
             foods: 0,
             iterations: 0,
             trial_limit: self.options.trial_limit.min(u32::from(u16::MAX)) as u16,
-            reward: self.options.reward as f32,
+            employed_foods: self.employed_foods(is_guided),
+            onlookers: OnlookerRules {
+                reward: self.options.reward as f32,
+                draws: self.options.neighbours_drawn,
+            },
+            plane_fit: self.options.plane_fit as f32,
             focused_views: self.options.focused_views as usize,
             around_start: (0.0, 0.0),
             stream: 0,
             level: self.level,
             cancelled,
+        }
+    }
+
+    fn employed_foods(&self, is_guided: bool) -> usize {
+        match self.options.employed_foods {
+            count if is_guided && count > 0 => count as usize,
+            _ => usize::MAX,
         }
     }
 

@@ -145,6 +145,11 @@ impl State {
         &self.cycles
     }
 
+    /// Drops the view sets, which nothing but the check asks for.
+    pub(super) fn forget_view_sets(&mut self) {
+        self.solved.sets.clear();
+    }
+
     pub(super) fn fits(&self, width: u32, height: u32, sources: usize) -> bool {
         let pixels = width as usize * height as usize;
         let words = ViewSets::empty(0, sources).words_per_pixel();

@@ -6,9 +6,11 @@ mod placement;
 mod reference;
 mod select;
 mod set;
+mod surface;
 
 pub use angle::{SourceLists, source_lists, triangulation_angle};
-pub use placement::{Group, Placed, Placements};
+pub use placement::{Group, Placed, Placements, Surfaces};
 pub use reference::{Reference, Source};
-pub use select::{ViewRules, faces_source, is_occluded};
+pub use select::{ViewRules, ViewSelector, are_occluded, faces_sources};
 pub use set::ViewSets;
+pub use surface::ShownPlane;

@@ -27,6 +27,7 @@ struct Fixed {
     epipole: Vec3,
     /// The last column and row of the image.
     corner: [f32; 2],
+    width: i32,
 }
 
 /// Up to eight source views, one a lane.
@@ -38,6 +39,8 @@ pub struct Group {
     epipole: [Lanes; 3],
     /// -1 in the lanes without a view: nothing lies inside their images.
     corner: [Lanes; 2],
+    /// Pixels of a row of the image.
+    width: [i32; LANES],
     /// `K'R K^-1 [x y 1]` of the pixel at work.
     at_infinity: [Lanes; 3],
 }
@@ -55,6 +58,17 @@ pub struct Placed {
     pub inside: u8,
 }
 
+/// The validated surfaces of the views of a group where a hypothesis falls.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surfaces {
+    /// Inverse depths at the nearest pixels, 0 where there is no surface.
+    pub nearest: Lanes,
+    /// Where the planes of those pixels meet the point's rays.
+    pub exact: Lanes,
+    /// The lanes whose view has a surface there, as bits.
+    pub known: u8,
+}
+
 impl<S: Simd> Placements<S> {
     /// The sources of a reference view, none of them taken yet.
     pub fn new(simd: S, reference: &Reference) -> Placements<S> {
@@ -62,6 +76,7 @@ impl<S: Simd> Placements<S> {
             infinite: source.pose.infinite,
             epipole: source.pose.epipole,
             corner: [(source.image.width - 1) as f32, (source.image.height - 1) as f32],
+            width: source.image.width as i32,
         };
         let views: Vec<Fixed> = reference.sources.iter().map(fixed).collect();
         let groups = vec![Group::new(); views.len().div_ceil(LANES)];
@@ -73,6 +88,15 @@ impl<S: Simd> Placements<S> {
     pub fn go_to(&mut self, x: f32, y: f32, set: &[u32]) {
         self.pixel = (x, y);
         self.keep(set);
+    }
+
+    /// Goes to another pixel with the same source views.
+    #[inline(always)]
+    pub fn move_to(&mut self, x: f32, y: f32) {
+        self.pixel = (x, y);
+        for group in &mut self.groups[..self.used] {
+            group.go_to(self.simd, self.pixel);
+        }
     }
 
     /// Takes another set of source views for the same pixel.
@@ -111,6 +135,7 @@ impl Group {
             infinite: [[zeros; 3]; 3],
             epipole: [zeros; 3],
             corner: [zeros; 2],
+            width: [0; LANES],
             at_infinity: [zeros; 3],
         }
     }
@@ -126,6 +151,7 @@ impl Group {
         }
         self.corner[0][lane] = view.corner[0];
         self.corner[1][lane] = view.corner[1];
+        self.width[lane] = view.width;
     }
 
     /// Empties the lanes from this one on.
@@ -174,6 +200,33 @@ impl Group {
             column: simd.store(simd.max(simd.min(column, right), zero)),
             row: simd.store(simd.max(simd.min(row, bottom), zero)),
             inside: simd.at_least(margin, zero) & in_front,
+        }
+    }
+
+    /// The validated planes of the views at the pixels nearest to where a hypothesis falls, and what their inverse depths
+    /// are exactly there.
+    #[inline(always)]
+    pub fn surfaces<S: Simd>(&self, simd: S, reference: &Reference, placed: &Placed) -> Surfaces {
+        let (column, row) = (simd.load(&placed.column), simd.load(&placed.row));
+        let half = simd.splat(0.5);
+        let nearest_column = simd.whole(simd.add(column, half));
+        let nearest_row = simd.whole(simd.add(row, half));
+        let places = simd.places(&self.width, nearest_column, nearest_row);
+        let zeros = [0.0; LANES];
+        let (mut nearest, mut slope_x, mut slope_y) = (zeros, zeros, zeros);
+        for (lane, &source) in self.sources().iter().enumerate() {
+            if let Some(plane) = reference.sources[source].surface.get(places[lane] as usize) {
+                nearest[lane] = plane.inverse_depth();
+                (slope_x[lane], slope_y[lane]) = plane.slopes();
+            }
+        }
+        let across = simd.mul(simd.load(&slope_x), simd.sub(column, nearest_column));
+        let down = simd.mul(simd.load(&slope_y), simd.sub(row, nearest_row));
+        let inverse_depth = simd.load(&nearest);
+        Surfaces {
+            nearest,
+            exact: simd.store(simd.add(simd.add(inverse_depth, across), down)),
+            known: simd.at_least(inverse_depth, simd.splat(f32::MIN_POSITIVE)),
         }
     }
 

@@ -1,8 +1,9 @@
 //! A reference view and its source views on one scale, in f32 and in the reference camera's frame.
 
+use super::ShownPlane;
 use crate::camera::Camera;
 use crate::image::PackedImage;
-use crate::kernels::{RelativePose, SlantedPlane};
+use crate::kernels::RelativePose;
 use crate::scene::DepthRange;
 use glam::{Mat3, Vec3};
 
@@ -34,8 +35,8 @@ pub struct Source<'a> {
     pub rotation: Mat3,
     /// Its centre of projection in the reference camera's frame.
     pub centre: Vec3,
-    /// Its validated solutions, one a pixel, with inverse depth 0 where there is none.
-    pub surface: &'a [SlantedPlane],
+    /// Its validated solutions, one a pixel.
+    pub surface: &'a [ShownPlane],
 }
 
 impl<'a> Reference<'a> {
@@ -68,7 +69,7 @@ impl<'a> Source<'a> {
         reference: &Camera,
         camera: &Camera,
         image: &'a PackedImage,
-        surface: &'a [SlantedPlane],
+        surface: &'a [ShownPlane],
     ) -> Source<'a> {
         let rotation = camera.rotation * reference.rotation.transpose();
         let centre = rotation.transpose() * (rotation * reference.translation - camera.translation);
@@ -80,25 +81,6 @@ impl<'a> Source<'a> {
             surface,
         }
     }
-
-    /// The validated solution at the pixel nearest to `(x, y)`, and the inverse depth of its plane exactly there;
-    /// `None` where there is none. `(x, y)` must lie inside the image.
-    #[inline(always)]
-    pub fn validated_at(&self, x: f32, y: f32) -> Option<ValidatedDepth> {
-        let (column, row) = ((x + 0.5) as usize, (y + 0.5) as usize);
-        let plane = self.surface.get(row * self.image.width + column)?;
-        let exact = plane.inverse_depth_at(x - column as f32, y - row as f32);
-        (plane.inverse_depth > 0.0).then_some(ValidatedDepth { nearest: plane.inverse_depth, exact })
-    }
-}
-
-/// A source's validated solution where a point projects, as inverse depths.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ValidatedDepth {
-    /// At the nearest pixel.
-    pub nearest: f32,
-    /// Where the plane of that pixel meets the point's ray.
-    pub exact: f32,
 }
 
 /// Where a point falls in the source view.

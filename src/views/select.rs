@@ -1,22 +1,48 @@
 //! The rules that refine a pixel's view set once it has a solution: incidence and visibility.
 
+use super::placement::{Placements, Surfaces};
 use super::{Reference, Source, ViewSets};
 use crate::options::Options;
+use crate::simd::{LANES, Simd};
 use glam::Vec3;
 
-/// Whether the surface faces the source: the angle between its normal and the ray to the source's centre is at most
+type Lanes = [f32; LANES];
+
+/// Eight points or directions, one a lane.
+type Vectors<S> = [<S as Simd>::F32; 3];
+
+/// Which of eight sources a surface faces: the angle between its normal and the ray to the source's centre is at most
 /// the one of this cosine (incident angle term of section 4). All in the reference camera's frame.
 #[inline(always)]
-pub fn faces_source(point: Vec3, normal: Vec3, source_centre: Vec3, min_cosine: f32) -> bool {
-    let to_source = source_centre - point;
-    normal.dot(to_source) >= min_cosine * to_source.length()
+pub fn faces_sources<S: Simd>(
+    simd: S,
+    point: Vec3,
+    normal: Vec3,
+    source_centres: &Vectors<S>,
+    min_cosine: f32,
+) -> u8 {
+    let [x, y, z] = *source_centres;
+    let to_source = [
+        simd.sub(x, simd.splat(point.x)),
+        simd.sub(y, simd.splat(point.y)),
+        simd.sub(z, simd.splat(point.z)),
+    ];
+    let normal = [simd.splat(normal.x), simd.splat(normal.y), simd.splat(normal.z)];
+    let length = simd.sqrt(dot(simd, &to_source, &to_source));
+    simd.at_least(dot(simd, &normal, &to_source), simd.mul(simd.splat(min_cosine), length))
 }
 
-/// Whether a validated surface at `validated_depth` hides a point at `depth` of the same source view (visibility term
-/// of section 4); `margin` is the relative distance that may be noise.
+/// In which of eight sources a validated surface at an inverse depth of `validated` hides a point at `depth` of the same
+/// source (visibility term of section 4); `margin` is the relative distance that may be noise.
 #[inline(always)]
-pub fn is_occluded(depth: f32, validated_depth: f32, margin: f32) -> bool {
-    validated_depth < depth * (1.0 - margin)
+pub fn are_occluded<S: Simd>(simd: S, depth: S::F32, validated: S::F32, margin: f32) -> u8 {
+    let nearest = simd.mul(simd.mul(depth, simd.splat(1.0 - margin)), validated);
+    !simd.at_least(simd.splat(1.0), nearest)
+}
+
+#[inline(always)]
+fn dot<S: Simd>(simd: S, a: &Vectors<S>, b: &Vectors<S>) -> S::F32 {
+    simd.mul_add(a[2], b[2], simd.mul_add(a[1], b[1], simd.mul(a[0], b[0])))
 }
 
 /// The rules with their thresholds.
@@ -40,40 +66,59 @@ impl ViewRules {
             enabled: options.view_selection,
         }
     }
+}
 
-    /// Puts into `sets` the source views that see the solution of a pixel: inside the image and, with view selection,
-    /// neither at grazing incidence nor occluded.
-    #[inline(always)]
-    pub fn select(
-        &self,
-        reference: &Reference,
-        sets: &mut [u32],
-        (x, y): (f32, f32),
-        depth: f32,
-        normal: Vec3,
-    ) {
-        sets.fill(0);
-        let point = reference.ray(x, y) * depth;
-        let mut kept = 0;
-        for (index, source) in reference.sources.iter().enumerate() {
-            let homogeneous = source.pose.at_infinity(x, y) + source.pose.epipole / depth;
-            let Some(at) = source.project(homogeneous) else { continue };
-            if self.enabled && !self.sees(source, point, normal, homogeneous.z * depth, (at.x, at.y)) {
-                continue;
-            }
-            ViewSets::insert_into(sets, index);
-            kept += 1;
-        }
-        if kept < self.min_views {
-            ViewSets::fill_words(sets, reference.sources.len());
-        }
+/// Applies the rules to one pixel of a reference view after the other, to eight of its sources at a time.
+#[derive(Debug, Clone)]
+pub struct ViewSelector<'a, S: Simd> {
+    simd: S,
+    reference: &'a Reference<'a>,
+    rules: ViewRules,
+    /// Of all sources.
+    placements: Placements<S>,
+    /// Centres of projection of the sources of each group, in the reference camera's frame.
+    centres: Vec<[Lanes; 3]>,
+}
+
+impl<'a, S: Simd> ViewSelector<'a, S> {
+    /// A selector for the pixels of a view.
+    pub fn new(simd: S, reference: &'a Reference<'a>, rules: ViewRules) -> ViewSelector<'a, S> {
+        let mut placements = Placements::new(simd, reference);
+        let mut all = vec![0; reference.sources.len().div_ceil(32)];
+        ViewSets::fill_words(&mut all, reference.sources.len());
+        placements.go_to(0.0, 0.0, &all);
+        let lanes = |sources: &[Source], axis: usize| -> Lanes {
+            std::array::from_fn(|lane| sources.get(lane).map_or(0.0, |source| source.centre[axis]))
+        };
+        let centres = |sources: &[Source]| std::array::from_fn(|axis| lanes(sources, axis));
+        let centres = reference.sources.chunks(LANES).map(centres).collect();
+        ViewSelector { simd, reference, rules, placements, centres }
     }
 
+    /// Puts into `set` the source views that see the solution of a pixel: inside the image and, with view selection,
+    /// neither at grazing incidence nor occluded.
     #[inline(always)]
-    fn sees(&self, source: &Source, point: Vec3, normal: Vec3, depth: f32, (x, y): (f32, f32)) -> bool {
-        faces_source(point, normal, source.centre, self.min_cosine)
-            && !source
-                .validated_at(x, y)
-                .is_some_and(|validated| is_occluded(depth, 1.0 / validated.nearest, self.occlusion_margin))
+    pub fn select(&mut self, set: &mut [u32], (x, y): (f32, f32), depth: f32, normal: Vec3) {
+        let ViewSelector { simd, reference, rules, placements, centres } = self;
+        set.fill(0);
+        placements.move_to(x, y);
+        let point = reference.ray(x, y) * depth;
+        let mut kept = 0;
+        for (index, (group, centres)) in placements.groups().iter().zip(centres).enumerate() {
+            let placed = group.place(*simd, depth);
+            let mut seen = placed.inside;
+            if rules.enabled {
+                let centres = [simd.load(&centres[0]), simd.load(&centres[1]), simd.load(&centres[2])];
+                seen &= faces_sources(*simd, point, normal, &centres, rules.min_cosine);
+                let Surfaces { nearest, .. } = group.surfaces(*simd, reference, &placed);
+                let depth = simd.mul(simd.load(&placed.centre[2]), simd.splat(depth));
+                seen &= !are_occluded(*simd, depth, simd.load(&nearest), rules.occlusion_margin);
+            }
+            set[index * LANES / 32] |= u32::from(seen) << (index * LANES % 32);
+            kept += seen.count_ones() as usize;
+        }
+        if kept < rules.min_views {
+            ViewSets::fill_words(set, reference.sources.len());
+        }
     }
 }

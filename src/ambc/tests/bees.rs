@@ -5,11 +5,14 @@ use crate::ambc::MIN_FACING;
 use crate::ambc::colony::{Colonies, colour};
 use crate::ambc::food::cost_to_beat;
 use crate::ambc::random::Random;
-use crate::ambc::{employed, onlooker, scout};
+use crate::ambc::{OnlookerRules, employed, onlooker, scout};
 use crate::testing::window;
 use glam::Vec3;
 
 // Employed bees.
+
+/// On all food sources.
+const ALL: usize = usize::MAX;
 
 #[test]
 fn employed_bees_keep_only_what_is_better_and_count_their_trials() {
@@ -21,7 +24,7 @@ fn employed_bees_keep_only_what_is_better_and_count_their_trials() {
     let mut improved = 0;
     for _ in 0..100 {
         let before = foods;
-        employed::send(&mut evaluator, &mut foods, &mut random);
+        employed::send(&mut evaluator, &mut foods, ALL, &mut random);
         for (before, after) in before.iter().zip(&foods) {
             if after == &(FoodSource { trials: before.trials + 1, ..*before }) {
                 continue;
@@ -51,7 +54,7 @@ fn employed_bees_stay_in_the_depth_range_and_on_the_visible_side() {
             FoodSource { cost: 9.0, ..FoodSource::new(reference.near, grazing[0]) },
             FoodSource { cost: 9.0, ..FoodSource::new(reference.far, grazing[1]) },
         ];
-        employed::send(&mut evaluator, &mut foods, &mut Random::new(7, seed));
+        employed::send(&mut evaluator, &mut foods, ALL, &mut Random::new(7, seed));
         for food in foods {
             assert!((reference.near..=reference.far).contains(&food.depth), "{food:?}");
             assert!(food.normal.dot(ray) < -MIN_FACING, "{food:?}");
@@ -62,7 +65,24 @@ fn employed_bees_stay_in_the_depth_range_and_on_the_visible_side() {
     assert!(kept > 500, "{kept} trials were kept");
 }
 
+#[test]
+fn employed_bees_work_on_the_first_food_sources_only_where_they_are_told_so() {
+    let (world, window) = (World::five(), window());
+    let reference = world.reference();
+    let mut evaluator = standing(&reference, &window, &options(), false);
+    let before = [1.0, 1.1, 0.7].map(|factor| evaluated(&mut evaluator, wall(&world, PIXEL, factor)));
+    let mut foods = before;
+    employed::send(&mut evaluator, &mut foods, 1, &mut Random::new(1, 2));
+    assert_ne!(foods[0], before[0]);
+    assert_eq!(foods[1..], before[1..]);
+}
+
 // Onlooker bees.
+
+/// Onlookers that go to the first neighbour drawn.
+fn plain(reward: f32) -> OnlookerRules {
+    OnlookerRules { reward, draws: 1 }
+}
 
 /// Colonies in which every pixel of the other colour has the wall as its best, its depth multiplied.
 fn neighbours(world: &World, factor: f32, validated: bool) -> Colonies {
@@ -87,13 +107,42 @@ fn onlookers_bring_a_neighbour_s_plane_to_the_pixel() {
     let wrong = evaluated(&mut evaluator, wall(&world, PIXEL, 1.2));
     for seed in 0..100 {
         let mut foods = [FoodSource { trials: 5, ..wrong }];
-        onlooker::send(&mut evaluator, &mut foods, &neighbours, PIXEL, 0.0, &mut Random::new(3, seed));
+        onlooker::send(&mut evaluator, &mut foods, &neighbours, PIXEL, plain(0.0), &mut Random::new(3, seed));
         let [food] = foods;
         // The wall is slanted: a neighbour's depth is another one.
         assert!((food.depth / wall(&world, PIXEL, 1.0).depth - 1.0).abs() < 1e-5, "{food:?}");
         assert_eq!((food.normal, food.trials), (testing::normal(&world.cameras[0]), 0));
         assert_eq!(food.cost, evaluator.cost(&food, f32::INFINITY));
     }
+}
+
+#[test]
+fn of_the_neighbours_drawn_the_one_of_the_cheapest_plane_is_visited() {
+    let (world, window) = (World::five(), window());
+    let reference = world.reference();
+    let mut evaluator = standing(&reference, &window, &options(), false);
+    // The neighbours to the left know the wall, the others a plane that costs them more.
+    let mut neighbours = neighbours(&world, 1.0, false);
+    for (x, y) in (0..28).flat_map(|y| (PIXEL.0..36).map(move |x| (x, y))) {
+        let at = y * neighbours.row_len() + x / 2;
+        if neighbours.foods[at].depth > 0.0 {
+            neighbours.foods[at] = FoodSource { cost: 0.5, ..wall(&world, (x, y), 1.1) };
+        }
+    }
+    let wrong = evaluated(&mut evaluator, wall(&world, PIXEL, 1.2));
+    let mut found_by = |draws: u32| {
+        let finds = |seed: &u64| {
+            let (mut foods, rules) = ([wrong], OnlookerRules { reward: 0.0, draws });
+            onlooker::send(&mut evaluator, &mut foods, &neighbours, PIXEL, rules, &mut Random::new(3, *seed));
+            (foods[0].depth / wall(&world, PIXEL, 1.0).depth - 1.0).abs() < 1e-5
+        };
+        (0..200).filter(finds).count()
+    };
+    // Eight of the twenty neighbours lie to the left.
+    let [one, three, many] = [1, 3, 20].map(&mut found_by);
+    assert!((50..110).contains(&one), "{one} of 200 by one draw");
+    assert!((135..180).contains(&three), "{three} of 200 by three draws");
+    assert_eq!(many, 200);
 }
 
 #[test]
@@ -113,7 +162,7 @@ fn a_slightly_dearer_plane_is_taken_from_a_validated_neighbour_only_and_at_its_t
     let mut after = |factor: f32, validated: bool, reward: f32| {
         let neighbours = neighbours(&world, factor, validated);
         let mut foods = [own];
-        onlooker::send(&mut evaluator, &mut foods, &neighbours, PIXEL, reward, &mut Random::new(3, 4));
+        onlooker::send(&mut evaluator, &mut foods, &neighbours, PIXEL, plain(reward), &mut Random::new(3, 4));
         (foods[0], evaluator.cost(&foods[0], f32::INFINITY))
     };
     let kept = FoodSource { trials: 1, ..own };
@@ -133,7 +182,7 @@ fn neighbours_that_were_never_searched_bring_nothing() {
     let own = evaluated(&mut evaluator, wall(&world, PIXEL, 1.3));
     let mut foods = [own];
     let empty = Colonies::new(36, 28, 1);
-    onlooker::send(&mut evaluator, &mut foods, &empty, PIXEL, 0.1, &mut Random::new(3, 4));
+    onlooker::send(&mut evaluator, &mut foods, &empty, PIXEL, plain(0.1), &mut Random::new(3, 4));
     assert_eq!(foods, [FoodSource { trials: 1, ..own }]);
 }
 

@@ -2,9 +2,9 @@
 
 mod bees;
 mod costs;
+mod fitted;
 mod planes;
 mod search;
-mod smoothness;
 
 use super::cost::Evaluator;
 use super::{CostRules, FoodSource};

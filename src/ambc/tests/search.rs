@@ -1,7 +1,7 @@
 //! The whole search of a view.
 
 use super::*;
-use crate::ambc::{Offer, Search};
+use crate::ambc::{Offer, OnlookerRules, Search};
 use crate::simd::Level;
 use crate::state::Solution;
 use crate::testing::{RANGE, window};
@@ -20,7 +20,9 @@ fn idle<'a>(reference: &'a Reference<'a>, window: &'a Window) -> Search<'a> {
         foods: 2,
         iterations: 0,
         trial_limit: 10,
-        reward: 0.05,
+        employed_foods: usize::MAX,
+        onlookers: OnlookerRules { reward: 0.05, draws: 1 },
+        plane_fit: 0.0,
         focused_views: 0,
         around_start: (0.0, 0.0),
         stream: 1,
