@@ -113,8 +113,8 @@ pub struct Options {
     /// iteration the plane fitted to such depths is tried. 0 tries none (`paper`).
     pub plane_fit: f64,
 
-    /// How often validated pixels that look more like a surface behind theirs are given to that one, after every check;
-    /// 0 for never (`paper`).
+    /// How often validated pixels that look more like a surface behind theirs are given to that one, after the last check
+    /// of each scale; 0 for never (`paper`).
     pub edge_passes: u32,
     /// How often the validated planes are averaged with those around them that continue the same surface, after every
     /// check; 0 for never (`paper`).
@@ -339,7 +339,7 @@ impl Default for Options {
             restart_tilt: 0.3,
             smoothness: 0.1,
             employed_foods: 1,
-            neighbours_drawn: 2,
+            neighbours_drawn: 3,
             plane_fit: 0.02,
             edge_passes: 2,
             smoothing_passes: 1,

@@ -46,19 +46,32 @@ fn a_panel_that_shows_nothing_but_noise_continues_the_wall_around_it() {
     assert!(with > 0.9 && without < with - 0.1, "{with} with filling alone and {without} without it");
 }
 
+/// Median error of the validated normals, in degrees.
+fn median_normal_error(made: &Procedural, options: Options) -> f64 {
+    let result = run(made, options);
+    let mut errors = Vec::new();
+    for (view, truth) in result.views.iter().zip(&made.truth) {
+        let validated = (0..truth.depth.len()).filter(|&pixel| view.outcome[pixel] == Outcome::Validated);
+        errors.extend(validated.map(|pixel| normal_error(&view.estimate, truth, pixel)));
+    }
+    errors.sort_unstable_by(f64::total_cmp);
+    errors[errors.len() / 2]
+}
+
 #[test]
 fn smoothing_makes_normals_more_exact() {
     let made = procedural::plane_and_sphere().only(&[1, 3, 4, 5, 7]);
-    let median = |smoothing_passes: u32| {
-        let result = run(&made, Options { smoothing_passes, ..Options::default() });
-        let mut errors = Vec::new();
-        for (view, truth) in result.views.iter().zip(&made.truth) {
-            let validated = (0..truth.depth.len()).filter(|&pixel| view.outcome[pixel] == Outcome::Validated);
-            errors.extend(validated.map(|pixel| normal_error(&view.estimate, truth, pixel)));
-        }
-        errors.sort_unstable_by(f64::total_cmp);
-        errors[errors.len() / 2]
-    };
-    let (with, without) = (median(1), median(0));
+    let with = median_normal_error(&made, Options::default());
+    let without = median_normal_error(&made, Options { smoothing_passes: 0, ..Options::default() });
     assert!(with < 0.8 * without, "{with} degrees with smoothing and {without} without");
+}
+
+#[test]
+fn planes_fitted_to_depths_make_normals_more_exact() {
+    let made = procedural::plane_and_sphere().only(&[1, 3, 4, 5, 7]);
+    // Smoothing averages normals too.
+    let plain = Options { smoothing_passes: 0, ..Options::default() };
+    let with = median_normal_error(&made, plain.clone());
+    let without = median_normal_error(&made, Options { plane_fit: 0.0, ..plain });
+    assert!(with < 0.8 * without, "{with} degrees with fitted planes and {without} without");
 }

@@ -224,8 +224,10 @@ impl Steps {
         }
         let ScaledView { camera, image, range, .. } = self.scaled(state.step(), view);
         state.solved.judge(&verdicts.0);
-        let is_last = state.step() + 1 == self.all().len();
-        trim(camera, image, *range, &mut state.solved.solutions, self.options.edge_passes, is_last);
+        if self.may_end_scale(state) {
+            let is_last = state.step() + 1 == self.all().len();
+            trim(camera, image, *range, &mut state.solved.solutions, self.options.edge_passes, is_last);
+        }
         for _ in 0..self.options.smoothing_passes {
             smooth(camera, image, *range, &mut state.solved.solutions);
         }
@@ -236,6 +238,14 @@ impl Steps {
             record.validated = validated;
         }
         Ok(())
+    }
+
+    /// Whether a scale ends with the step of a state, for all that the state knows.
+    fn may_end_scale(&self, state: &State) -> bool {
+        let scale = |step: usize| self.all().get(step).map(|step| step.scale_index);
+        let is_settled =
+            |record: &CycleRecord| (record.changed as f64) < self.options.stop_share * record.pixels as f64;
+        scale(state.step() + 1) != scale(state.step()) || state.cycles.last().is_some_and(is_settled)
     }
 
     /// A search with everything that all searches have in common; one that is guided has validated solutions to look at.
