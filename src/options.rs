@@ -107,7 +107,8 @@ pub struct Options {
     /// Food sources of each colony, the best first, that employed bees work on from the second cycle on; 0 for all of
     /// them (`paper`).
     pub employed_foods: u32,
-    /// Neighbours drawn at random of which an onlooker bee visits the one of the cheapest plane; 1 in `paper`.
+    /// Neighbours drawn at random of which an onlooker bee visits the one of the cheapest plane, those that look different
+    /// reckoned dearer; 1 in `paper`.
     pub neighbours_drawn: u32,
     /// Relative difference of inverse depths up to which a neighbour's depth continues the plane of a pixel: in every
     /// iteration the plane fitted to such depths is tried. 0 tries none (`paper`).
@@ -345,7 +346,7 @@ impl Default for Options {
             smoothing_passes: 1,
             triangulation_angle: (4.0, 40.0),
             max_sources: 12,
-            reward: 0.1,
+            reward: 0.05,
             geometric_weight: 0.2,
             consistent_share: 0.5,
             occluders_abstain: true,

@@ -95,6 +95,7 @@ pub struct Evaluator<'a, S: Simd> {
     has_texture: bool,
     is_weak: bool,
     ray: Vec3,
+    grey: u8,
     placements: Placements<S>,
     /// One for each group of the pixel's views.
     views: Vec<InViews>,
@@ -120,6 +121,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
             has_texture: false,
             is_weak: false,
             ray: Vec3::Z,
+            grey: 0,
             placements: Placements::new(simd, reference),
             views: Vec::with_capacity(reference.sources.len().div_ceil(LANES)),
             surroundings: Surroundings::new(rules.smoothness),
@@ -144,7 +146,8 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     pub fn go_to(&mut self, x: usize, y: usize, set: &[u32]) {
         self.patch.sample(self.simd, self.window, self.reference.image, x, y);
         self.has_texture = self.patch.has_texture(self.window);
-        let noise = self.reference.image.noise.variance(self.reference.image.grey(x, y));
+        self.grey = self.reference.image.grey(x, y);
+        let noise = self.reference.image.noise.variance(self.grey);
         self.is_weak = self.patch.variance() < self.rules.noise_ratio * noise;
         let (x, y) = (x as f32, y as f32);
         self.ray = self.reference.ray(x, y);
@@ -155,6 +158,12 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     #[inline(always)]
     pub fn look_around(&mut self, neighbours: &Colonies, (x, y): (usize, usize)) {
         self.surroundings.look(self.reference, self.window, neighbours, (x, y));
+    }
+
+    /// How alike the pixel and another one look, from 0 to 1: the bilateral weight of their grey values.
+    #[inline(always)]
+    pub fn likeness(&self, x: usize, y: usize) -> f32 {
+        self.window.likeness(self.grey, self.reference.image.grey(x, y))
     }
 
     /// Whether the pixel's patch can be matched.

@@ -52,7 +52,7 @@ pub fn send<S: Simd>(
     random: &mut Random,
 ) {
     for food in foods {
-        let offer = draw_best(neighbours, (x, y), rules.draws, random)
+        let offer = draw_best(evaluator, neighbours, (x, y), rules.draws, random)
             .and_then(|(dx, dy)| brought(evaluator, neighbours, (x, y), (dx, dy)))
             .filter(|offer| !is_same_plane(food, offer));
         let improved = match offer {
@@ -67,9 +67,11 @@ pub fn send<S: Simd>(
     }
 }
 
-/// The offset of the cheapest plane among so many random neighbours; of equals the first.
+/// The offset of the cheapest plane among so many random neighbours; of equals the first. Those that look different are
+/// reckoned dearer: where one surface has more texture than the next, its planes are the cheaper ones on both.
 #[inline(always)]
-fn draw_best(
+fn draw_best<S: Simd>(
+    evaluator: &Evaluator<S>,
     colonies: &Colonies,
     (x, y): (usize, usize),
     draws: u32,
@@ -77,9 +79,10 @@ fn draw_best(
 ) -> Option<(i32, i32)> {
     let mut best = draw_neighbour(colonies, x, y, random)?;
     let cost = |(dx, dy): (i32, i32)| {
-        let food = colonies.best(x.wrapping_add_signed(dx as isize), y.wrapping_add_signed(dy as isize));
+        let (x, y) = (x.wrapping_add_signed(dx as isize), y.wrapping_add_signed(dy as isize));
+        let food = colonies.best(x, y);
         // A neighbour that is masked or was never evaluated has nothing to offer.
-        if food.depth > 0.0 { food.cost } else { f32::INFINITY }
+        if food.depth > 0.0 { food.cost + 1.0 - evaluator.likeness(x, y) } else { f32::INFINITY }
     };
     for _ in 1..draws {
         if let Some(other) = draw_neighbour(colonies, x, y, random)

@@ -126,7 +126,7 @@ fn of_the_neighbours_drawn_the_one_of_the_cheapest_plane_is_visited() {
     for (x, y) in (0..28).flat_map(|y| (PIXEL.0..36).map(move |x| (x, y))) {
         let at = y * neighbours.row_len() + x / 2;
         if neighbours.foods[at].depth > 0.0 {
-            neighbours.foods[at] = FoodSource { cost: 0.5, ..wall(&world, (x, y), 1.1) };
+            neighbours.foods[at] = FoodSource { cost: 1.5, ..wall(&world, (x, y), 1.1) };
         }
     }
     let wrong = evaluated(&mut evaluator, wall(&world, PIXEL, 1.2));
@@ -143,6 +143,30 @@ fn of_the_neighbours_drawn_the_one_of_the_cheapest_plane_is_visited() {
     assert!((50..110).contains(&one), "{one} of 200 by one draw");
     assert!((135..180).contains(&three), "{three} of 200 by three draws");
     assert_eq!(many, 200);
+}
+
+#[test]
+fn of_equally_cheap_planes_the_one_of_the_neighbour_that_looks_most_alike_is_visited() {
+    let world = World::five();
+    let window = Window::new(5, 2, 5.0, 0.03, 1e-5);
+    let reference = world.reference();
+    let mut evaluator = standing(&reference, &window, &options(), false);
+    let place = |(dx, dy): (i32, i32)| {
+        (PIXEL.0.wrapping_add_signed(dx as isize), PIXEL.1.wrapping_add_signed(dy as isize))
+    };
+    let difference =
+        |(x, y): (usize, usize)| reference.image.grey(x, y).abs_diff(reference.image.grey(PIXEL.0, PIXEL.1));
+    let most_alike = onlooker::OFFSETS.into_iter().map(place).min_by_key(|&at| difference(at)).unwrap();
+    let mut neighbours = neighbours(&world, 1.1, false);
+    let at = most_alike.1 * neighbours.row_len() + most_alike.0 / 2;
+    neighbours.foods[at] = FoodSource { cost: 0.0, ..wall(&world, most_alike, 1.0) };
+    let wrong = evaluated(&mut evaluator, wall(&world, PIXEL, 1.2));
+    for seed in 0..20 {
+        let (mut foods, rules) = ([wrong], OnlookerRules { reward: 0.0, draws: 300 });
+        onlooker::send(&mut evaluator, &mut foods, &neighbours, PIXEL, rules, &mut Random::new(3, seed));
+        let off = foods[0].depth / wall(&world, PIXEL, 1.0).depth - 1.0;
+        assert!(off.abs() < 1e-5, "{off} after seed {seed}");
+    }
 }
 
 #[test]
