@@ -59,7 +59,8 @@ fn a_validated_plane_shown_by_a_source_is_the_wall_between_its_pixels_too() {
     placements.go_to(0.0, 0.0, &[0b11]);
     let group = &placements.groups()[0];
     let mut at = group.place(Scalar, 5.0);
-    (at.column[..2].fill(10.4), at.row[..2].fill(7.7));
+    at.column[..2].fill(10.4);
+    at.row[..2].fill(7.7);
     let shown = group.surfaces(Scalar, &reference, &at);
     assert_eq!(shown.nearest[0], world.surfaces[1][8 * 36 + 10].inverse_depth());
     assert_eq!(shown.known, 0b01);

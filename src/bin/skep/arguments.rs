@@ -30,8 +30,8 @@ pub struct Reconstruct {
     /// Where the results go [default: SCENE/dense]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// default measures best; fast takes about half of its time; paper follows the paper to the letter and takes
-    /// its own
+    /// default measures best; fast takes about two thirds of its time; paper follows the paper to the letter and
+    /// takes its own
     #[arg(long, default_value = "default", value_parser = Options::PRESETS)]
     pub preset: String,
     /// Worker threads; 0 takes one for each core. The result does not depend on it
