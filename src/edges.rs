@@ -152,16 +152,16 @@ struct Edges<'a> {
 }
 
 impl Edges<'_> {
-    /// The pixel at an offset, `None` outside the image.
-    fn neighbour(&self, (x, y): (usize, usize), (dx, dy): (i32, i32)) -> Option<usize> {
+    /// Column and row of the pixel at an offset, `None` outside the image.
+    fn neighbour(&self, (x, y): (usize, usize), (dx, dy): (i32, i32)) -> Option<(usize, usize)> {
         let (column, row) = (x.wrapping_add_signed(dx as isize), y.wrapping_add_signed(dy as isize));
-        (column < self.image.width && row < self.image.height).then(|| row * self.image.width + column)
+        (column < self.image.width && row < self.image.height).then_some((column, row))
     }
 
     /// Relative difference to a pixel's inverse depth of what the plane of its neighbour at an offset has there; `None`
     /// without one.
-    fn difference(&self, own: f32, neighbour: usize, (dx, dy): (i32, i32)) -> Option<f32> {
-        let plane = &self.planes[neighbour];
+    fn difference(&self, own: f32, (x, y): (usize, usize), (dx, dy): (i32, i32)) -> Option<f32> {
+        let plane = &self.planes[y * self.image.width + x];
         let there = plane.inverse_depth_at(-dx as f32, -dy as f32);
         (plane.inverse_depth > 0.0).then_some(there / own - 1.0)
     }
@@ -176,26 +176,20 @@ impl Edges<'_> {
         if !PROBES.iter().any(is_edge) {
             return Belongs::ToItsOwn;
         }
-        let is_inside = |at: usize, size: usize| at >= RADIUS as usize && at + (RADIUS as usize) < size;
-        let nothing_is_outside = is_inside(at.0, self.image.width) && is_inside(at.1, self.image.height);
         let grey = self.image.grey(at.0, at.1);
         let (mut same, mut behind, mut empty) = (1.0, 0.0, 0.0);
         let (mut inverse_depth, mut normal) = (0.0, Vec3::ZERO);
         for &Neighbour { offset, weight } in &self.weights.neighbours {
-            let (x, y) =
-                (at.0.wrapping_add_signed(offset.0 as isize), at.1.wrapping_add_signed(offset.1 as isize));
-            if !nothing_is_outside && (x >= self.image.width || y >= self.image.height) {
-                continue;
-            }
-            let other = y * self.image.width + x;
-            let weight = weight * self.weights.by_grey[usize::from(grey.abs_diff(self.image.grey(x, y)))];
+            let Some(other) = self.neighbour(at, offset) else { continue };
+            let difference_of_greys = grey.abs_diff(self.image.grey(other.0, other.1));
+            let weight = weight * self.weights.by_grey[usize::from(difference_of_greys)];
             match self.difference(own, other, offset) {
                 None => empty += weight,
                 Some(difference) if difference.abs() < SAME => same += weight,
                 Some(difference) if difference < -BEHIND => {
                     behind += weight;
                     inverse_depth += weight * own * (1.0 + difference);
-                    normal += weight * self.before[other].normal;
+                    normal += weight * self.before[other.1 * self.image.width + other.0].normal;
                 }
                 Some(_) => {}
             }

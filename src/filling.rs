@@ -2,9 +2,10 @@
 //! place tells of it. Each connected part is filled with the plane that most of its rim lies on, if there is one; it
 //! must pass the consistency check like everything else.
 
-use crate::ambc::{FoodSource, MIN_FACING, Random};
+use crate::ambc::{FoodSource, Random};
+use crate::kernels::SlantedPlane;
 use crate::views::Reference;
-use glam::{DMat3, DVec3, Vec3};
+use glam::{DMat3, DVec3};
 
 /// Width of the rim, in pixels.
 const RIM: usize = 3;
@@ -168,20 +169,13 @@ fn least_squares<'a>(witnesses: impl Iterator<Item = &'a Witness>) -> Option<DVe
 
 /// The plane at a pixel, unless it leaves the depth range or turns away there.
 fn on_plane(reference: &Reference, plane: DVec3, (x, y): (usize, usize)) -> Option<FoodSource> {
-    let (focal, principal) = (reference.inverse_focal, reference.principal);
-    let inverse_depth = plane.dot(DVec3::new(x as f64, y as f64, 1.0));
-    let depth = (1.0 / inverse_depth) as f32;
-    // With q = plane . [x y 1] = m . ray and n . X = -D: n = -m / |m|.
-    let towards = DVec3::new(
-        plane.x / f64::from(focal.0),
-        plane.y / f64::from(focal.1),
-        plane.z + plane.x * f64::from(principal.0) + plane.y * f64::from(principal.1),
-    );
-    let normal: Vec3 = (-towards.normalize_or_zero()).as_vec3();
-    let is_usable = depth >= reference.near
-        && depth <= reference.far
-        && normal.dot(reference.ray(x as f32, y as f32)) < -MIN_FACING;
-    is_usable.then(|| FoodSource { validated: true, ..FoodSource::new(depth, normal) })
+    let plane = SlantedPlane {
+        inverse_depth: plane.dot(DVec3::new(x as f64, y as f64, 1.0)) as f32,
+        slope_x: plane.x as f32,
+        slope_y: plane.y as f32,
+    };
+    let found = FoodSource::of_plane(reference, reference.ray(x as f32, y as f32), &plane)?;
+    Some(FoodSource { validated: true, ..found })
 }
 
 #[cfg(test)]

@@ -88,10 +88,10 @@ impl ViewState {
         let solutions: Vec<Solution> = (0..fine.pixels()).into_par_iter().map(refine).collect();
         let surface = shown(fine, &solutions);
         let cost = (0..fine.pixels()).map(|pixel| self.cost[parent(pixel)]).collect();
-        let mut sets = self.sets.clone();
-        if !sets.is_clear() {
-            sets = sets.of((0..fine.pixels()).map(parent));
-        }
+        let sets = match self.sets.is_clear() {
+            true => self.sets.clone(),
+            false => self.sets.of((0..fine.pixels()).map(parent)),
+        };
         ViewState { solutions, cost, sets, surface }
     }
 }

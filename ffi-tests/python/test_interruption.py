@@ -56,6 +56,8 @@ INTERRUPTED = """
 import signal, sys, threading
 sys.path.insert(0, sys.argv[1])
 import made, skep
+# A shell that runs the tests in the background has them ignore Ctrl-C.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 before = signal.getsignal(signal.SIGINT)
 told = []
 def progress(progress):

@@ -1,5 +1,6 @@
 //! Matching cost of a hypothesis over the source views of its pixel (section 5.2 of the paper).
 
+use super::aggregation::{InViews, cheaper, seen, sum, sum_of_least};
 use super::colony::Colonies;
 use super::food::{FoodSource, cost_to_beat};
 use super::smoothness::{SmoothnessRules, Surroundings};
@@ -9,7 +10,6 @@ use crate::options::{Aggregation, Options};
 use crate::simd::{LANES, Simd};
 use crate::views::{Group, Placed, Placements, Reference, ViewSets};
 use glam::Vec3;
-use std::cmp::Ordering;
 
 type Lanes = [f32; LANES];
 
@@ -71,18 +71,6 @@ impl CostRules {
         let disagreement = simd.select(surfaces.known, bounded, simd.splat(self.geometric_unknown));
         simd.store(simd.mul(simd.splat(self.geometric_weight), disagreement))
     }
-}
-
-/// The largest k of [`Aggregation::BestViews`].
-pub const MAX_BEST_VIEWS: usize = 8;
-
-/// The hypothesis at work in the source views of a group.
-#[derive(Debug, Clone, Copy)]
-struct InViews {
-    placed: Placed,
-    /// The least it can cost in each view that has it in its image: the geometric term, and the photometric one as soon
-    /// as it is known.
-    least: Lanes,
 }
 
 /// Evaluates hypotheses of one pixel after the other.
@@ -246,7 +234,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
                 (0..LANES).filter(|&lane| placed.inside >> lane & 1 != 0 && least[lane] < unknown).count()
             })
             .sum();
-        let all = self.seen();
+        let all = seen(&self.views);
         let is_matched = all > count && agreeing < count;
         if is_matched {
             let plane = food.plane(self.reference, self.ray);
@@ -259,7 +247,9 @@ impl<'a, S: Simd> Evaluator<'a, S> {
             set.fill(0);
             for group in 0..self.views.len() {
                 for (lane, &source) in self.placements.groups()[group].sources().iter().enumerate() {
-                    if self.cheaper(group, lane) < kept && self.views[group].placed.inside >> lane & 1 != 0 {
+                    if cheaper(self.simd, &self.views, group, lane) < kept
+                        && self.views[group].placed.inside >> lane & 1 != 0
+                    {
                         ViewSets::insert_into(set, source);
                     }
                 }
@@ -273,30 +263,10 @@ impl<'a, S: Simd> Evaluator<'a, S> {
             self.placements.keep(set);
             if let (Aggregation::BestViews(best), true) = (self.rules.aggregation, is_matched) {
                 let best = (best as usize).min(kept);
-                return self.sum_of_least(kept, best) / best as f32;
+                return sum_of_least(self.simd, &self.views, kept, best) / best as f32;
             }
         }
         self.cost(food, f32::INFINITY)
-    }
-
-    /// The number of views in which the hypothesis costs less than in this one; of equals the earlier cost less.
-    #[inline(always)]
-    fn cheaper(&self, group: usize, lane: usize) -> usize {
-        let simd = self.simd;
-        let cost = simd.splat(self.views[group].least[lane]);
-        let mut count = 0;
-        for (other, InViews { placed, least }) in self.views.iter().enumerate() {
-            let costs = simd.load(least);
-            let not_less = simd.at_least(costs, cost);
-            let earlier = match other.cmp(&group) {
-                Ordering::Less => u8::MAX,
-                Ordering::Equal => (1 << lane) - 1,
-                Ordering::Greater => 0,
-            };
-            let equal = not_less & simd.at_least(cost, costs);
-            count += ((!not_less | equal & earlier) & placed.inside).count_ones() as usize;
-        }
-        count
     }
 
     /// Finds where a hypothesis falls in the views of the set. A view whose image its centre leaves does not count.
@@ -309,12 +279,6 @@ impl<'a, S: Simd> Evaluator<'a, S> {
             let least = rules.geometric_costs(*simd, reference, group, &placed, food.depth);
             views.push(InViews { placed, least });
         }
-    }
-
-    /// Number of views that have the hypothesis in their image.
-    #[inline(always)]
-    fn seen(&self) -> usize {
-        self.views.iter().map(|view| view.placed.inside.count_ones() as usize).sum()
     }
 
     /// Adds what the hypothesis costs in the views of a group by their images.
@@ -344,26 +308,26 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     /// Equation 3 of the paper: a small set is penalised.
     #[inline(always)]
     fn all_views(&mut self, food: &FoodSource, bound: f32) -> f32 {
-        let count = self.seen();
+        let count = seen(&self.views);
         if count <= 1 {
             return f32::INFINITY;
         }
         let plane = food.plane(self.reference, self.ray);
         let divisor = (count - 1) as f32;
         for group in 0..self.views.len() {
-            if self.sum() >= bound * divisor {
+            if sum(self.simd, &self.views) >= bound * divisor {
                 self.counts.early_outs += 1;
                 return f32::INFINITY;
             }
             self.add_photometric_costs(&plane, group);
         }
-        self.sum() / divisor
+        sum(self.simd, &self.views) / divisor
     }
 
     /// The mean over the best views of the set; views that cannot see the point do not raise it.
     #[inline(always)]
     fn best_views(&mut self, food: &FoodSource, bound: f32, best: usize) -> f32 {
-        let count = self.seen();
+        let count = seen(&self.views);
         if count < self.rules.min_views {
             return f32::INFINITY;
         }
@@ -373,78 +337,15 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         let (mut unmatched, is_guided) = (count, self.rules.geometric_weight > 0.0);
         for group in 0..self.views.len() {
             // Views that are not matched yet and cost nothing else leave nothing to sum.
-            if (is_guided || unmatched < best || limit <= 0.0) && self.sum_of_least(count, best) >= limit {
+            if (is_guided || unmatched < best || limit <= 0.0)
+                && sum_of_least(self.simd, &self.views, count, best) >= limit
+            {
                 self.counts.early_outs += 1;
                 return f32::INFINITY;
             }
             self.add_photometric_costs(&plane, group);
             unmatched -= self.views[group].placed.inside.count_ones() as usize;
         }
-        self.sum_of_least(count, best) / best as f32
+        sum_of_least(self.simd, &self.views, count, best) / best as f32
     }
-
-    /// The costs in the views that have the hypothesis in their image.
-    #[inline(always)]
-    fn sum(&self) -> f32 {
-        let zero = self.simd.splat(0.0);
-        let mut sum = zero;
-        for InViews { placed, least } in &self.views {
-            sum = self.simd.add(sum, self.simd.select(placed.inside, self.simd.load(least), zero));
-        }
-        self.simd.sum(sum)
-    }
-
-    /// The sum of the `best` smallest of those `count` costs.
-    #[inline(always)]
-    fn sum_of_least(&self, count: usize, best: usize) -> f32 {
-        if count == best {
-            return self.sum();
-        }
-        if count == best + 1 {
-            let zero = self.simd.splat(0.0);
-            let mut largest = zero;
-            for InViews { placed, least } in &self.views {
-                largest =
-                    self.simd.max(largest, self.simd.select(placed.inside, self.simd.load(least), zero));
-            }
-            return self.sum() - self.simd.largest(largest);
-        }
-        match best {
-            1 => sum_of::<1>(&self.views),
-            2 => sum_of::<2>(&self.views),
-            3 => sum_of::<3>(&self.views),
-            4 => sum_of::<4>(&self.views),
-            5 => sum_of::<5>(&self.views),
-            6 => sum_of::<6>(&self.views),
-            7 => sum_of::<7>(&self.views),
-            _ => sum_of::<MAX_BEST_VIEWS>(&self.views),
-        }
-    }
-}
-
-/// The sum of the smallest costs in the views that have the hypothesis in their image.
-#[inline(always)]
-fn sum_of<const BEST: usize>(views: &[InViews]) -> f32 {
-    let mut least = [f32::INFINITY; BEST];
-    for InViews { placed, least: costs } in views {
-        for (lane, &cost) in costs.iter().enumerate() {
-            let mut cost = if placed.inside >> lane & 1 != 0 { cost } else { f32::INFINITY };
-            // Without branches: which costs are small cannot be predicted.
-            for place in &mut least {
-                (*place, cost) = (smaller(*place, cost), larger(*place, cost));
-            }
-        }
-    }
-    least.iter().sum()
-}
-
-/// Costs are numbers: `f32::min` would look for others.
-#[inline(always)]
-fn smaller(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-#[inline(always)]
-fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }

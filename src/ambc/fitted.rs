@@ -2,7 +2,7 @@
 //! the depths of many neighbours tell the normal.
 
 use super::colony::Colonies;
-use super::food::{FoodSource, MIN_FACING};
+use super::food::FoodSource;
 use super::onlooker::OFFSETS;
 use crate::kernels::SlantedPlane;
 use crate::views::Reference;
@@ -59,7 +59,6 @@ pub fn fitted(
         slope_x: plane.slope_x + slope.x,
         slope_y: plane.slope_y + slope.y,
     };
-    let (depth, normal) = fit.depth_and_normal(ray, reference.inverse_focal);
-    let is_usable = depth >= reference.near && depth <= reference.far && normal.dot(ray) < -MIN_FACING;
-    is_usable.then(|| FoodSource { validated: food.validated, ..FoodSource::new(depth, normal) })
+    let Some(found) = FoodSource::of_plane(reference, ray, &fit) else { return None };
+    Some(FoodSource { validated: food.validated, ..found })
 }

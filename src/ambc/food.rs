@@ -56,6 +56,15 @@ impl FoodSource {
         FoodSource::new(depth, if facing { normal } else { self.normal })
     }
 
+    /// The food source of a plane about the pixel with this ray, not evaluated yet; `None` where it leaves the depth range
+    /// or turns away from the camera.
+    #[inline(always)]
+    pub fn of_plane(reference: &Reference, ray: Vec3, plane: &SlantedPlane) -> Option<FoodSource> {
+        let (depth, normal) = plane.depth_and_normal(ray, reference.inverse_focal);
+        let is_usable = depth >= reference.near && depth <= reference.far && normal.dot(ray) < -MIN_FACING;
+        is_usable.then(|| FoodSource::new(depth, normal))
+    }
+
     /// Its plane written as inverse depth about its pixel.
     #[inline(always)]
     pub fn plane(&self, reference: &Reference, ray: Vec3) -> SlantedPlane {

@@ -1,5 +1,6 @@
 //! The Artificial Multi-Bee Colony search (section 5 of the paper): one colony a pixel, whose food sources are planes.
 
+mod aggregation;
 mod colony;
 mod cost;
 mod employed;

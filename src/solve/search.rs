@@ -145,7 +145,7 @@ impl Steps {
             };
             let mut found = search.run()?;
             let words = found.sets.words_per_pixel();
-            // A few pixels, and every back-end gives the same bits.
+            // Every back-end gives the same bits.
             let mut selector = ViewSelector::new(Scalar, &reference, search.view_rules);
             for pixel in fill(&reference, &mut found.best, &found.weak) {
                 let FoodSource { depth, normal, .. } = found.best[pixel];
