@@ -182,6 +182,7 @@ fn on_plane(reference: &Reference, plane: DVec3, (x, y): (usize, usize)) -> Opti
 mod tests {
     use super::*;
     use crate::testing::{self, World};
+    use glam::Vec3;
 
     const SIZE: (u32, u32) = (60, 48);
     const WIDTH: usize = SIZE.0 as usize;

@@ -59,6 +59,6 @@ pub fn fitted(
         slope_x: plane.slope_x + slope.x,
         slope_y: plane.slope_y + slope.y,
     };
-    let Some(found) = FoodSource::of_plane(reference, ray, &fit) else { return None };
+    let found = FoodSource::of_plane(reference, ray, &fit)?;
     Some(FoodSource { validated: food.validated, ..found })
 }
