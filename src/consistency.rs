@@ -42,6 +42,11 @@ impl ConsistencyRules {
         }
     }
 
+    /// The same with half of the tolerance of depths.
+    pub fn closer(self) -> ConsistencyRules {
+        ConsistencyRules { depth_tolerance: 0.5 * self.depth_tolerance, ..self }
+    }
+
     /// Compares a solution, as depth and normal in the source view's frame, with the source view's own.
     #[inline(always)]
     pub fn judge(&self, depth: f32, normal: Vec3, own: &Solution) -> Verdict {
@@ -162,6 +167,15 @@ mod tests {
             // A source without a solution speaks against.
             assert_eq!(rules.judge(4.0, Vec3::NEG_Z, &Solution::default()), Verdict::Inconsistent);
         }
+    }
+
+    #[test]
+    fn closer_rules_halve_the_tolerance_of_depths() {
+        let closer = ConsistencyRules::new(&abstaining(false)).closer();
+        let judge = |factor: f32, degrees| closer.judge(4.0, Vec3::NEG_Z, &own(4.0 * factor, degrees));
+        assert_eq!(judge(1.0049, 29.0), Verdict::Consistent);
+        assert_eq!(judge(1.0051, 0.0), Verdict::Inconsistent);
+        assert_eq!(judge(1.0, 31.0), Verdict::Inconsistent);
     }
 
     #[test]

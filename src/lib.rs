@@ -9,6 +9,7 @@ mod ambc;
 pub mod camera;
 #[cfg(feature = "capi")]
 mod capi;
+mod closing;
 mod consistency;
 mod edges;
 mod error;

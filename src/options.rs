@@ -120,6 +120,9 @@ pub struct Options {
     /// How often the validated planes are averaged with those around them that continue the same surface, after every
     /// check; 0 for never (`paper`).
     pub smoothing_passes: u32,
+    /// Whether pixels without a validated solution are offered the plane of the surface around them after the last check;
+    /// not in `paper`.
+    pub close_gaps: bool,
 
     /// Whether the view set of each pixel is refined by incidence and visibility. Off keeps the start set.
     pub view_selection: bool,
@@ -210,6 +213,7 @@ impl Options {
             plane_fit: 0.0,
             edge_passes: 0,
             smoothing_passes: 0,
+            close_gaps: false,
             view_selection: true,
             triangulation_angle: (10.0, 30.0),
             max_sources: 0,
@@ -344,6 +348,7 @@ impl Default for Options {
             plane_fit: 0.02,
             edge_passes: 2,
             smoothing_passes: 1,
+            close_gaps: true,
             triangulation_angle: (4.0, 40.0),
             max_sources: 12,
             reward: 0.05,

@@ -3,7 +3,7 @@
 use crate::ambc::Assessment;
 use crate::image::ScaledView;
 use crate::maps::Outcome;
-use crate::state::ViewState;
+use crate::state::Solution;
 
 /// A solution this close to an end of the depth range was stopped by it.
 const AT_RANGE_END: f32 = 1e-3;
@@ -11,14 +11,14 @@ const AT_RANGE_END: f32 = 1e-3;
 /// What became of each pixel of a view with this many source views, of which a solution must be seen in `needed`.
 pub fn outcomes(
     view: &ScaledView,
-    state: &ViewState,
+    solutions: &[Solution],
     assessment: &Assessment,
     sources: usize,
     needed: usize,
 ) -> Vec<Outcome> {
     let (near, far) = (view.range.near as f32, view.range.far as f32);
     let outcome = |pixel: usize| {
-        let solution = &state.solutions[pixel];
+        let solution = &solutions[pixel];
         if view.mask.as_ref().is_some_and(|mask| !mask[pixel]) {
             Outcome::Masked
         } else if solution.validated {
@@ -36,7 +36,7 @@ pub fn outcomes(
             Outcome::Inconsistent
         }
     };
-    (0..state.solutions.len()).map(outcome).collect()
+    (0..solutions.len()).map(outcome).collect()
 }
 
 #[cfg(test)]
@@ -84,10 +84,10 @@ mod tests {
             mask: Some(mask),
             range: RANGE,
         };
-        assert_eq!(outcomes(&view, state, &assessment, 4, 2), expected);
+        assert_eq!(outcomes(&view, &state.solutions, &assessment, 4, 2), expected);
         // With a single source no pixel can be validated: that is the reason.
         state.solutions.iter_mut().for_each(|solution| solution.validated = false);
-        let lonely = outcomes(&view, state, &assessment, 1, 2);
+        let lonely = outcomes(&view, &state.solutions, &assessment, 1, 2);
         assert!(lonely[0] == Outcome::Masked && lonely[1..].iter().all(|&o| o == Outcome::NoSources));
     }
 }

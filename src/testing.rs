@@ -1,6 +1,7 @@
 //! A small world for the unit tests of single steps: cameras in a row before a slanted wall with texture, of which
 //! everything is known exactly.
 
+use crate::ambc::Random;
 use crate::camera::{Camera, Plane};
 use crate::image::{PackedImage, Picture};
 use crate::kernels::Window;
@@ -25,9 +26,15 @@ fn wall_normal() -> DVec3 {
     DVec3::new(0.2, 0.1, -1.0).normalize()
 }
 
-fn grey(point: DVec3) -> u8 {
+/// Grey value of the wall's texture.
+pub fn grey(point: DVec3) -> u8 {
     let waves = (7.0 * point.x + 3.0 * point.y).sin() + (5.0 * point.y - 3.0 * point.x + 1.0).sin();
     (127.0 + 55.0 * waves).round() as u8
+}
+
+/// Normally distributed with deviation 1, near enough.
+pub fn white(random: &mut Random) -> f32 {
+    (0..12).map(|_| random.unit()).sum::<f32>() - 6.0
 }
 
 /// The wall in a camera's frame.

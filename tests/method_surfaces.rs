@@ -54,6 +54,39 @@ fn a_panel_that_shows_nothing_but_noise_continues_the_wall_around_it() {
     assert!(with > 0.9 && without < with - 0.1, "{with} with filling alone and {without} without it");
 }
 
+/// Pixels that are validated within half a percent of the truth, of all, and of those that are validated.
+fn right_depths(made: &Procedural, options: Options) -> (Share, Share) {
+    let result = run(made, options);
+    let (mut of_all, mut of_validated) = (Share::default(), Share::default());
+    for (view, truth) in result.views.iter().zip(&made.truth) {
+        for pixel in 0..truth.depth.len() {
+            let is_validated = view.outcome[pixel] == Outcome::Validated;
+            let off = (view.estimate.depth[pixel] / truth.depth[pixel] - 1.0).abs();
+            of_all.add(is_validated && off < 0.005);
+            if is_validated {
+                of_validated.add(off < 0.005);
+            }
+        }
+    }
+    (of_all, of_validated)
+}
+
+#[test]
+fn closing_gaps_completes_surfaces_without_wrong_ones() {
+    let made = procedural::plane_and_sphere().only(&[1, 3, 4, 5, 7]);
+    let (complete, right) = right_depths(&made, Options::default());
+    let (complete_without, right_without) =
+        right_depths(&made, Options { close_gaps: false, ..Options::default() });
+    let (with, without) = (complete.value(), complete_without.value());
+    assert!(with > without + 0.005, "{with} of the pixels are right with closed gaps, {without} without");
+    assert!(
+        right.value() > right_without.value() - 0.005,
+        "{} right, {}",
+        right.value(),
+        right_without.value()
+    );
+}
+
 /// Median error of the validated normals, in degrees.
 fn median_normal_error(made: &Procedural, options: Options) -> f64 {
     let result = run(made, options);

@@ -73,6 +73,7 @@ fn flattest(mut deviations: Vec<f32>) -> f32 {
 mod tests {
     use super::*;
     use crate::ambc::Random;
+    use crate::testing;
 
     fn picture((width, height): (u32, u32), grey: impl Fn(u32, u32) -> f32) -> Picture {
         let values = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
@@ -80,10 +81,9 @@ mod tests {
         Picture::from_grey(width, height, greys).unwrap()
     }
 
-    /// Normally distributed with deviation 1, near enough, and the same for the same pixel.
+    /// The same for the same pixel.
     fn white(x: u32, y: u32) -> f32 {
-        let mut random = Random::new(5, u64::from(y) << 32 | u64::from(x));
-        (0..12).map(|_| random.unit()).sum::<f32>() - 6.0
+        testing::white(&mut Random::new(5, u64::from(y) << 32 | u64::from(x)))
     }
 
     #[test]

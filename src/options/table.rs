@@ -89,6 +89,7 @@ pub(super) const TABLE: &[Entry] = &[
     entry!(number c"plane_fit", 0.0, 1.0, plane_fit),
     entry!(whole c"edge_passes", 0, 100, edge_passes as u32),
     entry!(whole c"smoothing_passes", 0, 100, smoothing_passes as u32),
+    entry!(switch c"close_gaps", close_gaps),
     entry!(switch c"view_selection", view_selection),
     entry!(number c"triangulation_angle.min", 0.0, 180.0, triangulation_angle.0),
     entry!(number c"triangulation_angle.max", 0.0, 180.0, triangulation_angle.1),

@@ -1,17 +1,21 @@
-//! What a run hands out for a view: confidence and outcome of every pixel.
+//! What a run hands out for a view: its solutions with small gaps closed, and what became of every pixel.
 
 use super::prepare::Steps;
 use super::search::missing;
-use super::state::State;
-use crate::ambc::assess;
+use super::state::{State, maps_of};
+use crate::ambc::{Search, assess};
+use crate::closing;
+use crate::consistency::{self, ConsistencyRules};
 use crate::error::Result;
+use crate::image::ScaledView;
 use crate::maps::ViewResult;
 use crate::outcome::outcomes;
 use crate::progress::{Hook, Phase, Tracker};
-use crate::views::ViewRules;
+use crate::state::{Solution, ViewState};
+use crate::views::{ViewRules, ViewSets, select_sets};
 
 impl Steps {
-    /// Settles view set, cost and outcome of every pixel of a view after the last step.
+    /// Closes small gaps and settles view set, cost and outcome of every pixel of a view after the last step.
     ///
     /// # Errors
     /// A view there is not; states that are not of full size, of another scene or view than they stand for, or not
@@ -44,16 +48,20 @@ impl Steps {
         let mut search = self.plain_search(step, &reference, true, &cancelled);
         // A set that falls back to the start set would hide that nothing sees the solution.
         search.view_rules = ViewRules::new(&self.options, 0);
-        let assessment = assess(&search, &own.solved.solutions)?;
+        let mut solutions = own.solved.solutions.clone();
+        if self.options.close_gaps {
+            self.close_gaps(view, states, (&search, &mut solutions))?;
+        }
+        let assessment = assess(&search, &solutions)?;
         let mut counts = own.counts();
         counts += assessment.counts;
         let sources = self.sources(view).to_vec();
         Ok(ViewResult {
             width: self.scaled(step, view).camera.width,
-            estimate: own.maps(),
+            estimate: maps_of(&solutions),
             outcome: outcomes(
                 self.scaled(step, view),
-                &own.solved,
+                &solutions,
                 &assessment,
                 sources.len(),
                 self.options.min_matched(),
@@ -64,5 +72,36 @@ impl Steps {
             counts,
             cycles: own.cycles().to_vec(),
         })
+    }
+
+    /// Gives pixels without a validated solution what the surfaces around them go on to, where the sources agree.
+    fn close_gaps(
+        &self,
+        view: usize,
+        states: &[Option<&State>],
+        (search, solutions): (&Search, &mut [Solution]),
+    ) -> Result<()> {
+        let reference = search.reference;
+        let ScaledView { camera, image, range, .. } = self.scaled(self.all().len() - 1, view);
+        let offers = closing::offers(camera, image, *range, solutions);
+        let mut sets = ViewSets::empty(offers.len(), reference.sources.len());
+        let made = offers.iter().enumerate().filter(|(_, offer)| offer.depth > 0.0);
+        let made = made.map(|(pixel, offer)| (pixel, offer.depth, offer.normal));
+        select_sets(reference, search.view_rules, &mut sets, made);
+        let offered = ViewState { solutions: offers, sets, ..ViewState::default() };
+        let sources: Vec<Option<&ViewState>> = self
+            .sources(view)
+            .iter()
+            .map(|&source| states.get(source as usize).copied().flatten().map(|state| &state.solved))
+            .collect();
+        // What is offered has no cost of its own that speaks for it: the sources must agree more closely.
+        let rules = ConsistencyRules::new(&self.options).closer();
+        let verdicts = consistency::check(reference, &offered, &sources, &rules, search.cancelled)?;
+        for (pixel, (consistent, validated)) in verdicts.into_iter().enumerate() {
+            if validated {
+                solutions[pixel] = Solution { consistent, validated, ..offered.solutions[pixel] };
+            }
+        }
+        Ok(())
     }
 }

@@ -12,10 +12,9 @@ use crate::maps::CycleRecord;
 use crate::options::Aggregation;
 use crate::progress::{Cancelled, Hook, Phase, Tracker};
 use crate::propagation::{self, Giver};
-use crate::simd::Scalar;
 use crate::smoothing::smooth;
 use crate::state::{Solution, ViewState};
-use crate::views::{Reference, Source, ViewRules, ViewSelector, ViewSets};
+use crate::views::{Reference, Source, ViewRules, ViewSets, select_sets};
 
 /// The planes other views offer to the pixels of a view; nothing on a scale's first cycle or with propagation off.
 #[derive(Debug, Clone)]
@@ -144,15 +143,11 @@ impl Steps {
                 ..self.plain_search(step, &reference, is_guided, &cancelled)
             };
             let mut found = search.run()?;
-            let words = found.sets.words_per_pixel();
-            // Every back-end gives the same bits.
-            let mut selector = ViewSelector::new(Scalar, &reference, search.view_rules);
-            for pixel in fill(&reference, &mut found.best, &found.weak) {
+            let filled = fill(&reference, &mut found.best, &found.weak).into_iter().map(|pixel| {
                 let FoodSource { depth, normal, .. } = found.best[pixel];
-                let at = ((pixel % reference.image.width) as f32, (pixel / reference.image.width) as f32);
-                let set = &mut found.sets.words_mut()[pixel * words..][..words];
-                selector.select(set, at, depth, normal);
-            }
+                (pixel, depth, normal)
+            });
+            select_sets(&reference, search.view_rules, &mut found.sets, filled);
             state.counts += found.counts;
             let solution = |food: &FoodSource| Solution {
                 depth: food.depth,

@@ -112,11 +112,7 @@ impl State {
 
     /// Depth and normal of every pixel, validated or not.
     pub fn maps(&self) -> Maps {
-        let solutions = &self.solved.solutions;
-        Maps {
-            depth: solutions.iter().map(|solution| solution.depth).collect(),
-            normal: solutions.iter().map(|solution| solution.normal.to_array()).collect(),
-        }
+        maps_of(&self.solved.solutions)
     }
 
     /// Aggregated cost of every pixel's solution.
@@ -174,4 +170,12 @@ impl State {
 /// Whether a normal is a unit vector as far as files and f32 keep it one.
 pub(super) fn is_unit(normal: Vec3) -> bool {
     (normal.length() - 1.0).abs() < 1e-2
+}
+
+/// Depth and normal of every solution.
+pub(super) fn maps_of(solutions: &[Solution]) -> Maps {
+    Maps {
+        depth: solutions.iter().map(|solution| solution.depth).collect(),
+        normal: solutions.iter().map(|solution| solution.normal.to_array()).collect(),
+    }
 }

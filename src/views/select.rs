@@ -3,7 +3,7 @@
 use super::placement::{Placements, Surfaces};
 use super::{Reference, Source, ViewSets};
 use crate::options::Options;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Scalar, Simd};
 use glam::Vec3;
 
 type Lanes = [f32; LANES];
@@ -120,5 +120,21 @@ impl<'a, S: Simd> ViewSelector<'a, S> {
         if kept < rules.min_views {
             ViewSets::fill_words(set, reference.sources.len());
         }
+    }
+}
+
+/// Selects the sets of some pixels, given with depth and normal of their solutions.
+pub fn select_sets(
+    reference: &Reference,
+    rules: ViewRules,
+    sets: &mut ViewSets,
+    solutions: impl IntoIterator<Item = (usize, f32, Vec3)>,
+) {
+    let words = sets.words_per_pixel();
+    // Every back-end gives the same bits.
+    let mut selector = ViewSelector::new(Scalar, reference, rules);
+    for (pixel, depth, normal) in solutions {
+        let at = ((pixel % reference.image.width) as f32, (pixel / reference.image.width) as f32);
+        selector.select(&mut sets.words_mut()[pixel * words..][..words], at, depth, normal);
     }
 }
