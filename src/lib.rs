@@ -6,6 +6,7 @@
 #![deny(unsafe_code)]
 
 mod ambc;
+mod averaging;
 pub mod camera;
 #[cfg(feature = "capi")]
 mod capi;

@@ -99,7 +99,7 @@ pub struct Options {
     /// Cost of a plane that the validated planes of all four neighbours contradict, where they look alike; 0 for no
     /// smoothness (`paper`).
     pub smoothness: f64,
-    /// Relative difference of depths that contradicts altogether; smaller ones in proportion.
+    /// Relative difference of depths that contradicts altogether; smaller ones by their square.
     pub smoothness_depth: f64,
     /// Angle between normals that contradicts altogether, in degrees.
     pub smoothness_normal: f64,
@@ -120,6 +120,9 @@ pub struct Options {
     /// How often the validated planes are averaged with those around them that continue the same surface, after every
     /// check; 0 for never (`paper`).
     pub smoothing_passes: u32,
+    /// Whether the validated depths are averaged with what the source views found of the same surface after the last
+    /// check; not in `paper`.
+    pub average_views: bool,
     /// Whether pixels without a validated solution are offered the plane of the surface around them after the last check;
     /// not in `paper`.
     pub close_gaps: bool,
@@ -140,11 +143,11 @@ pub struct Options {
     /// Whether consistent solutions are offered to other views.
     pub propagation: bool,
 
-    /// Cost per percent of disagreement with a source's validated depth; 0 is none (`paper`).
+    /// Cost of a plane that a source's validated depth contradicts altogether; 0 is none (`paper`).
     pub geometric_weight: f64,
-    /// Disagreement at which that cost stops growing, in percent.
+    /// Relative difference of depths that contradicts altogether, in percent; smaller ones by their square.
     pub geometric_limit: f64,
-    /// Disagreement assumed where the source has no validated depth, in percent.
+    /// Difference assumed where the source has no validated depth, in percent.
     pub geometric_unknown: f64,
 
     /// Largest relative difference of depths that are consistent.
@@ -213,6 +216,7 @@ impl Options {
             plane_fit: 0.0,
             edge_passes: 0,
             smoothing_passes: 0,
+            average_views: false,
             close_gaps: false,
             view_selection: true,
             triangulation_angle: (10.0, 30.0),
@@ -342,17 +346,19 @@ impl Default for Options {
             focused_views: 5,
             restart_spread: 0.01,
             restart_tilt: 0.3,
-            smoothness: 0.1,
+            smoothness: 0.05,
             employed_foods: 1,
             neighbours_drawn: 3,
             plane_fit: 0.02,
             edge_passes: 2,
             smoothing_passes: 1,
+            average_views: true,
             close_gaps: true,
             triangulation_angle: (4.0, 40.0),
             max_sources: 12,
             reward: 0.05,
-            geometric_weight: 0.2,
+            geometric_weight: 0.3,
+            geometric_unknown: 1.75,
             consistent_share: 0.5,
             occluders_abstain: true,
             fusion: FusionOptions { min_views: 3, ..Options::paper().fusion },

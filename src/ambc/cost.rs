@@ -20,26 +20,36 @@ pub struct CostRules {
     /// Hypotheses in fewer views cost infinitely much.
     min_views: usize,
     noise_ratio: f32,
-    /// Cost per unit of relative disagreement with a validated depth; 0 without the geometric term.
-    geometric_weight: f32,
-    /// Relative disagreement at which it stops growing.
-    geometric_limit: f32,
-    /// Relative disagreement where the source has no validated depth.
-    geometric_unknown: f32,
+    geometric: GeometricRules,
     smoothness: SmoothnessRules,
+}
+
+/// How disagreement with the source views' validated depths is priced: by its square, which leaves hypotheses that nearly
+/// agree to the images, up to a limit, so that a wrong neighbour cannot rule out a good match.
+#[derive(Debug, Clone, Copy)]
+struct GeometricRules {
+    /// Cost of a square of relative disagreement; 0 without the geometric term.
+    weight: f32,
+    /// Relative disagreement at which it stops growing.
+    limit: f32,
+    /// Cost where the source has no validated depth.
+    unknown: f32,
 }
 
 impl CostRules {
     /// The rules of these options; the geometric term needs validated solutions.
     pub fn new(options: &Options, with_geometric_term: bool) -> CostRules {
         let weight = if with_geometric_term { options.geometric_weight } else { 0.0 };
+        let unknown = options.geometric_unknown.min(options.geometric_limit) / options.geometric_limit;
         CostRules {
             aggregation: options.aggregation,
             min_views: options.min_matched(),
             noise_ratio: options.noise_ratio as f32,
-            geometric_weight: (weight * 100.0) as f32,
-            geometric_limit: (options.geometric_limit / 100.0) as f32,
-            geometric_unknown: (options.geometric_unknown / 100.0) as f32,
+            geometric: GeometricRules {
+                weight: (weight * (100.0 / options.geometric_limit).powi(2)) as f32,
+                limit: (options.geometric_limit / 100.0) as f32,
+                unknown: (weight * unknown.powi(2)) as f32,
+            },
             smoothness: SmoothnessRules {
                 weight: options.smoothness as f32,
                 depth_scale: options.smoothness_depth as f32,
@@ -48,8 +58,7 @@ impl CostRules {
         }
     }
 
-    /// What a hypothesis of this depth costs in the views of a group by disagreeing with their validated depths: bounded,
-    /// so that a wrong neighbour cannot rule out a good match.
+    /// What a hypothesis of this depth costs in the views of a group by disagreeing with their validated depths.
     #[inline(always)]
     fn geometric_costs<S: Simd>(
         &self,
@@ -59,17 +68,17 @@ impl CostRules {
         placed: &Placed,
         depth: f32,
     ) -> Lanes {
-        if self.geometric_weight == 0.0 {
+        let GeometricRules { weight, limit, unknown } = self.geometric;
+        if weight == 0.0 {
             return [0.0; LANES];
         }
         let surfaces = group.surfaces(simd, reference, placed);
         let depth_there = simd.mul(simd.splat(depth), simd.load(&placed.centre[2]));
         let one = simd.splat(1.0);
         let difference = simd.sub(simd.mul(depth_there, simd.load(&surfaces.exact)), one);
-        let difference = simd.max(difference, simd.sub(simd.splat(0.0), difference));
-        let bounded = simd.min(difference, simd.splat(self.geometric_limit));
-        let disagreement = simd.select(surfaces.known, bounded, simd.splat(self.geometric_unknown));
-        simd.store(simd.mul(simd.splat(self.geometric_weight), disagreement))
+        let square = simd.min(simd.mul(difference, difference), simd.splat(limit * limit));
+        let known = simd.mul(simd.splat(weight), square);
+        simd.store(simd.select(surfaces.known, known, simd.splat(unknown)))
     }
 }
 
@@ -228,7 +237,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     #[inline(always)]
     pub fn focus(&mut self, food: &FoodSource, count: usize, set: &mut [u32]) -> f32 {
         self.place(food);
-        let unknown = self.rules.geometric_weight * self.rules.geometric_unknown;
+        let unknown = self.rules.geometric.unknown;
         let agreeing: usize = (self.views.iter())
             .map(|InViews { placed, least }| {
                 (0..LANES).filter(|&lane| placed.inside >> lane & 1 != 0 && least[lane] < unknown).count()
@@ -334,7 +343,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         let plane = food.plane(self.reference, self.ray);
         let best = best.min(count);
         let limit = bound * best as f32;
-        let (mut unmatched, is_guided) = (count, self.rules.geometric_weight > 0.0);
+        let (mut unmatched, is_guided) = (count, self.rules.geometric.weight > 0.0);
         for group in 0..self.views.len() {
             // Views that are not matched yet and cost nothing else leave nothing to sum.
             if (is_guided || unmatched < best || limit <= 0.0)

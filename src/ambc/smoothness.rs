@@ -7,7 +7,7 @@ use crate::kernels::Window;
 use crate::views::Reference;
 use glam::Vec3;
 
-/// How disagreement with neighbours is priced.
+/// How disagreement with neighbours is priced: by its square, which leaves planes that nearly agree to the images.
 #[derive(Debug, Clone, Copy)]
 pub struct SmoothnessRules {
     /// Cost of disagreeing with all neighbours altogether; 0 without smoothness.
@@ -88,7 +88,7 @@ impl Surroundings {
             let depth = (prediction.depth / food.depth - 1.0).abs() / self.rules.depth_scale;
             let normal = (1.0 - prediction.normal.dot(food.normal)) / self.rules.normal_scale;
             let disagreement = depth + normal;
-            sum += prediction.weight * if disagreement < 1.0 { disagreement } else { 1.0 };
+            sum += prediction.weight * if disagreement < 1.0 { disagreement * disagreement } else { 1.0 };
         }
         sum
     }

@@ -4,6 +4,7 @@ use super::prepare::Steps;
 use super::search::missing;
 use super::state::{State, maps_of};
 use crate::ambc::{Search, assess};
+use crate::averaging::average;
 use crate::closing;
 use crate::consistency::{self, ConsistencyRules};
 use crate::error::Result;
@@ -49,6 +50,9 @@ impl Steps {
         // A set that falls back to the start set would hide that nothing sees the solution.
         search.view_rules = ViewRules::new(&self.options, 0);
         let mut solutions = own.solved.solutions.clone();
+        if self.options.average_views {
+            average(&reference, &mut solutions);
+        }
         if self.options.close_gaps {
             self.close_gaps(view, states, (&search, &mut solutions))?;
         }

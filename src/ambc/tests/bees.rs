@@ -284,7 +284,10 @@ fn a_plane_that_continues_the_validated_neighbours_is_preferred_and_others_pay_u
         foods[0] == food(0.1 + extra, 1.0)
     };
     assert!(!prefers_wall(false, 1.05, 0.001), "neighbours that are not validated have no say");
-    assert!(prefers_wall(true, 1.005, 0.05) && !prefers_wall(true, 1.005, 0.15), "half of the limit");
+    assert!(
+        prefers_wall(true, 1.005, 0.03) && !prefers_wall(true, 1.005, 0.07),
+        "half of the limit, by square"
+    );
     assert!(prefers_wall(true, 1.05, 0.15) && !prefers_wall(true, 1.05, 0.25), "the limit");
     assert!(prefers_wall(true, 1.5, 0.15) && !prefers_wall(true, 1.5, 0.25), "no more than the limit");
 }

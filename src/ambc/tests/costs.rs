@@ -97,7 +97,7 @@ fn disagreeing_with_validated_depths_costs_up_to_a_limit() {
     let (mut world, window) = (World::five(), window());
     let options = Options {
         aggregation: Aggregation::BestViews(8),
-        geometric_weight: 0.2,
+        geometric_weight: 0.6,
         geometric_limit: 3.0,
         geometric_unknown: 1.5,
         ..options()
@@ -109,8 +109,8 @@ fn disagreeing_with_validated_depths_costs_up_to_a_limit() {
             .map(|geometric| standing(&reference, &window, &options, geometric).cost(&food, f32::INFINITY));
         with - without
     };
-    // Nothing is validated yet: 0.2 for each of 1.5 percent.
-    assert!((penalty(&world, 1.0) - 0.3).abs() < 1e-5);
+    // Nothing is validated yet: half of the limit is assumed, which costs a quarter.
+    assert!((penalty(&world, 1.0) - 0.15).abs() < 1e-5);
     for view in 1..5 {
         let mut state = testing::exact(&world.cameras[view]);
         let validated = vec![(4, true); state.solutions.len()];
@@ -118,8 +118,9 @@ fn disagreeing_with_validated_depths_costs_up_to_a_limit() {
         world.surfaces[view] = state.surface;
     }
     assert!(penalty(&world, 1.0).abs() < 1e-3);
-    let off = penalty(&world, 1.01);
-    assert!((0.1..0.3).contains(&off), "{off} for a percent");
+    let [half, one, two] = [1.005, 1.01, 1.02].map(|factor| penalty(&world, factor));
+    assert!((0.04..0.09).contains(&one), "{one} for a percent");
+    assert!((3.5..4.5).contains(&(one / half)) && (3.5..4.5).contains(&(two / one)), "{half}, {one}, {two}");
     assert!((penalty(&world, 1.2) - 0.6).abs() < 1e-5, "the limit of 3 percent");
 }
 
