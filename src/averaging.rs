@@ -1,6 +1,8 @@
 //! Averaging between views, beyond the paper: the same surface is found in every view by itself, with errors of its own.
-//! Each validated depth is averaged with what the source views found of the same surface.
+//! Each validated plane is averaged with those that the source views found of the same surface.
 
+use crate::ambc::MIN_FACING;
+use crate::kernels::SlantedPlane;
 use crate::state::Solution;
 use crate::views::{Reference, Source};
 use glam::Vec3;
@@ -11,43 +13,57 @@ const SAME: f32 = 0.01;
 /// Difference at which what it found counts for 1 / sqrt(e) of the pixel's own.
 const SIGMA: f32 = 0.004;
 
-/// Averages the validated solutions of a view whose sources show theirs. Normals stay; depths stay in the range.
+/// Averages the validated solutions of a view whose sources show theirs; planes that would leave the depth range or turn
+/// away stay.
 pub fn average(reference: &Reference, solutions: &mut [Solution]) {
     let width = reference.image.width;
     solutions.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
         for (x, solution) in row.iter_mut().enumerate().filter(|(_, solution)| solution.validated) {
+            let at = (x as f32, y as f32);
+            let ray = reference.ray(at.0, at.1);
             let own = 1.0 / solution.depth;
-            let (mut sum, mut weights) = (own, 1.0);
+            let (mut inverse_depth, mut normal, mut weights) = (own, solution.normal, 1.0);
             for source in &reference.sources {
-                let Some(found) = found_by(source, (x as f32, y as f32), own) else { continue };
-                let off = found / own - 1.0;
+                let Some(found) = found_by(source, at, own) else { continue };
+                let off = found.inverse_depth / own - 1.0;
                 if off.abs() < SAME {
                     let weight = (-off * off / (2.0 * SIGMA * SIGMA)).exp();
-                    sum += weight * found;
+                    inverse_depth += weight * found.inverse_depth;
+                    normal += weight * found.depth_and_normal(ray, reference.inverse_focal).1;
                     weights += weight;
                 }
             }
-            solution.depth = (weights / sum).clamp(reference.near, reference.far);
+            let (depth, normal) = (weights / inverse_depth, normal.normalize_or_zero());
+            let is_in_range = depth >= reference.near && depth <= reference.far;
+            if weights > 1.0 && is_in_range && normal.dot(ray) < -MIN_FACING {
+                *solution = Solution { depth, normal, ..*solution };
+            }
         }
     });
 }
 
-/// Inverse depth of a pixel on the plane that a source view found where the pixel's own solution falls.
-fn found_by(source: &Source, (x, y): (f32, f32), inverse_depth: f32) -> Option<f32> {
-    let (start, epipole) = (source.pose.at_infinity(x, y), source.pose.epipole);
-    let at = source.project(start + epipole * inverse_depth)?;
+/// The plane, about a pixel, that a source view found where the pixel's own solution falls.
+fn found_by(source: &Source, (x, y): (f32, f32), inverse_depth: f32) -> Option<SlantedPlane> {
+    let (pose, start) = (&source.pose, source.pose.at_infinity(x, y));
+    let at = source.project(start + pose.epipole * inverse_depth)?;
     let (column, row) = ((at.x + 0.5) as usize, (at.y + 0.5) as usize);
     let plane = source.surface.get(row * source.image.width + column)?;
     let (slope_x, slope_y) = plane.slopes();
-    // The plane's inverse depth at the point `start + epipole * d` is `d` over its third coordinate.
+    // A pixel at inverse depth w is `start + w epipole` in the source view; its inverse depth there is w over the third
+    // coordinate, and on the plane that is linear in the other two over the third.
     let (column, row) = (column as f32, row as f32);
     let along = |point: Vec3| {
         slope_x * (point.x - column * point.z)
             + slope_y * (point.y - row * point.z)
             + plane.inverse_depth() * point.z
     };
-    let found = along(start) / (1.0 - along(epipole));
-    (plane.inverse_depth() > 0.0 && found > 0.0).then_some(found)
+    let scale = 1.0 / (1.0 - along(pose.epipole));
+    let found = SlantedPlane {
+        inverse_depth: along(start) * scale,
+        slope_x: along(pose.infinite[0]) * scale,
+        slope_y: along(pose.infinite[1]) * scale,
+    };
+    (plane.inverse_depth() > 0.0 && found.inverse_depth > 0.0).then_some(found)
 }
 
 #[cfg(test)]
@@ -93,7 +109,7 @@ mod tests {
         average(&world.reference(), &mut solutions);
         for (solution, before) in solutions.iter().zip(&before) {
             assert!((solution.depth / before.depth - 1.0).abs() < 1e-5, "{solution:?} was {before:?}");
-            assert_eq!(Solution { depth: before.depth, ..*solution }, *before);
+            assert!((solution.normal - before.normal).length() < 3e-3, "{solution:?} was {before:?}");
         }
     }
 
@@ -129,7 +145,9 @@ mod tests {
         let mut reference = world.reference();
         reference.far = before.iter().map(|solution| solution.depth).fold(0.0, f32::max);
         average(&reference, &mut solutions);
+        average(&reference, &mut solutions);
         assert!(solutions.iter().all(|solution| solution.depth <= reference.far));
-        assert!(solutions.iter().any(|solution| solution.depth == reference.far));
+        assert!(solutions.iter().zip(&before).any(|(solution, before)| solution == before));
+        assert!(solutions.iter().zip(&before).any(|(solution, before)| solution != before));
     }
 }

@@ -120,8 +120,8 @@ pub struct Options {
     /// How often the validated planes are averaged with those around them that continue the same surface, after every
     /// check; 0 for never (`paper`).
     pub smoothing_passes: u32,
-    /// Whether the validated depths are averaged with what the source views found of the same surface after the last
-    /// check; not in `paper`.
+    /// Whether the validated planes are averaged with those that the source views found of the same surface after the
+    /// last check; not in `paper`.
     pub average_views: bool,
     /// Whether pixels without a validated solution are offered the plane of the surface around them after the last check;
     /// not in `paper`.
