@@ -15,6 +15,8 @@ use rayon::prelude::*;
 const RADIUS: i32 = 4;
 /// Difference of grey values at which a neighbour counts for 1 / sqrt(e).
 const GREY_SIGMA: f32 = 6.0;
+/// What a neighbour that looks altogether different still counts: where all do, the nearest ones tell.
+const MIN_LIKENESS: f32 = 1e-6;
 /// Distance in pixels at which it counts for 1 / sqrt(e).
 const SPATIAL_SIGMA: f32 = 2.7;
 /// Relative difference of inverse depths up to which two neighbours lie on the same surface.
@@ -45,7 +47,7 @@ pub fn offers(
         solutions,
         planes: surface(camera, solutions),
         neighbourhood: neighbourhood(),
-        by_grey: std::array::from_fn(|difference| gaussian(difference as f32, GREY_SIGMA)),
+        by_grey: std::array::from_fn(|difference| gaussian(difference as f32, GREY_SIGMA).max(MIN_LIKENESS)),
     };
     let offer = |(pixel, solution): (usize, &Solution)| {
         let is_open = !solution.validated && solution.depth > 0.0;
@@ -178,6 +180,14 @@ mod tests {
                 false => assert_eq!(*offer, Solution::default(), "validated already"),
             }
         }
+    }
+
+    #[test]
+    fn a_gap_that_looks_like_nothing_around_it_is_offered_the_plane_around_it_too() {
+        let gap = 14 * WIDTH + 20;
+        let grey = |pixel| if pixel == gap { 255 } else { 0 };
+        let offers = offers_for(grey, RANGE, &wall(|x, y| y * WIDTH + x == gap));
+        assert_offered(&offers[gap], testing::depth(&camera(), gap), testing::normal(&camera()));
     }
 
     #[test]
