@@ -1082,8 +1082,9 @@ skep_status skep_steps_next(const struct skep_steps *steps,
                             uint32_t *next_out);
 
 /**
- * Settles source views, cost and outcome of every pixel of a view after the last step, from checked states. The result
- * holds this view alone, under its own number.
+ * Averages planes with those of the source views, closes small gaps, and settles source views, cost and outcome of
+ * every pixel of a view after the last step, from checked states. The result holds this view alone, under its own
+ * number.
  */
 skep_status skep_steps_finish(const struct skep_steps *steps,
                               uint32_t view,

@@ -329,8 +329,9 @@ pub unsafe extern "C" fn skep_steps_next(
     })
 }
 
-/// Settles source views, cost and outcome of every pixel of a view after the last step, from checked states. The result
-/// holds this view alone, under its own number.
+/// Averages planes with those of the source views, closes small gaps, and settles source views, cost and outcome of
+/// every pixel of a view after the last step, from checked states. The result holds this view alone, under its own
+/// number.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_steps_finish(
     steps: *const skep_steps,

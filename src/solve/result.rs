@@ -1,4 +1,5 @@
-//! What a run hands out for a view: its solutions with small gaps closed, and what became of every pixel.
+//! What a run hands out for a view: its solutions averaged with those of other views and with small gaps
+//! closed, and what became of every pixel.
 
 use super::prepare::Steps;
 use super::search::missing;
@@ -16,7 +17,7 @@ use crate::state::{Solution, ViewState};
 use crate::views::{ViewRules, ViewSets, select_sets};
 
 impl Steps {
-    /// Closes small gaps and settles view set, cost and outcome of every pixel of a view after the last step.
+    /// Averages planes between views, closes small gaps and settles view set, cost and outcome of every pixel of a view after the last step.
     ///
     /// # Errors
     /// A view there is not; states that are not of full size, of another scene or view than they stand for, or not
@@ -93,11 +94,7 @@ impl Steps {
         let made = made.map(|(pixel, offer)| (pixel, offer.depth, offer.normal));
         select_sets(reference, search.view_rules, &mut sets, made);
         let offered = ViewState { solutions: offers, sets, ..ViewState::default() };
-        let sources: Vec<Option<&ViewState>> = self
-            .sources(view)
-            .iter()
-            .map(|&source| states.get(source as usize).copied().flatten().map(|state| &state.solved))
-            .collect();
+        let sources = self.found_by_sources(view, states);
         // What is offered has no cost of its own that speaks for it: the sources must agree more closely.
         let rules = ConsistencyRules::new(&self.options).closer();
         let verdicts = consistency::check(reference, &offered, &sources, &rules, search.cancelled)?;

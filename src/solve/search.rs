@@ -196,13 +196,19 @@ impl Steps {
         };
         own.require_marked(&format!("states[{view}]"), false)?;
         let reference = self.reference(step, view, states);
-        let sources: Vec<Option<&ViewState>> = self
-            .sources(view)
-            .iter()
-            .map(|&source| states[source as usize].map(|state| &state.solved))
-            .collect();
+        let sources = self.found_by_sources(view, states);
         let rules = ConsistencyRules::new(&self.options);
         Ok(Verdicts(consistency::check(&reference, &own.solved, &sources, &rules, cancelled)?))
+    }
+
+    /// What each source view of a view found, `None` of one without a state.
+    pub(super) fn found_by_sources<'b>(
+        &self,
+        view: usize,
+        states: &[Option<&'b State>],
+    ) -> Vec<Option<&'b ViewState>> {
+        let found = |&source: &u32| states.get(source as usize).copied().flatten().map(|state| &state.solved);
+        self.sources(view).iter().map(found).collect()
     }
 
     /// Writes the verdicts of a check into the state they were made for: what is validated guides the next search.

@@ -250,7 +250,8 @@ class Steps:
     def finish(
         self, view: int, states: Sequence[State | None], progress: ProgressFunction | None = None
     ) -> ResultView:
-        """Settles source views, cost and outcome of every pixel after the last step; from checked states."""
+        """Averages planes with those of the source views, closes small gaps, and settles source views, cost and outcome
+        of every pixel after the last step; from checked states."""
         known = tuple(states)
         number = index(view, "view")
         finish = lib.skep_steps_finish
