@@ -119,16 +119,68 @@ static void check_guidance(const scene *made, const skep_steps *steps, uint32_t 
     free(nothing);
 }
 
+/* Finished as they are, true maps match well and are all validated. */
+static void check_finished(const scene *made, const skep_steps *steps, skep_state **states) {
+    const size_t pixels = scene_pixels(made);
+    skep_result *result = NULL;
+    REQUIRE(skep_steps_finish(steps, 1, (const skep_state *const *)states, made->views, NULL, NULL,
+                              &result));
+    view_maps maps = maps_of(result, 1);
+    CHECK(same_bytes(maps.depth[0], made->photographs[1].depth, 4 * pixels), "the maps given");
+    CHECK(maps.statistics.pixels[SKEP_PIXEL_VALIDATED] == pixels, "all are validated");
+    double sum = 0;
+    for (size_t i = 0; i < pixels; ++i) {
+        sum += maps.cost[i];
+    }
+    printf("mean cost of the true maps: %.3f\n", sum / pixels);
+    CHECK(scene_is_small() || sum < 0.25 * pixels, "%g", sum / pixels);
+    maps_free(&maps);
+    skep_result_destroy(result);
+}
+
+/* Averaged between views, true maps stay true: the views agree. */
+static void check_averaged(const scene *made, const skep_scene *handed_in, skep_options *options) {
+    REQUIRE(skep_options_set(options, "average_views", 1));
+    skep_steps *steps = NULL;
+    uint32_t count = 0;
+    REQUIRE(skep_steps_create(handed_in, options, &steps));
+    REQUIRE(skep_steps_get_count(steps, &count, NULL));
+    skep_state *states[MAX_VIEWS] = {NULL};
+    for (uint32_t view = 0; view < made->views; ++view) {
+        states[view] = true_state(made, steps, count - 1, view);
+    }
+    skep_result *result = NULL;
+    REQUIRE(skep_steps_finish(steps, 1, (const skep_state *const *)states, made->views, NULL, NULL,
+                              &result));
+    view_maps maps = maps_of(result, 1);
+    const photograph *truth = &made->photographs[1];
+    size_t moved = 0;
+    for (size_t i = 0; i < scene_pixels(made); ++i) {
+        moved += maps.depth[0][i] != truth->depth[i];
+        CHECK(!truth->surface[i] || fabsf(maps.depth[0][i] / truth->depth[i] - 1) < 1e-3f,
+              "pixel %zu at %g, truly %g", i, maps.depth[0][i], truth->depth[i]);
+    }
+    CHECK(moved > 0, "something is averaged");
+    maps_free(&maps);
+    skep_result_destroy(result);
+    for (uint32_t view = 0; view < made->views; ++view) {
+        skep_state_destroy(states[view]);
+    }
+    skep_steps_destroy(steps);
+}
+
 void test_own_maps(const char *folder) {
     (void)folder;
     scene made;
     scene_make(&made);
     skep_options *options = quick_options();
+    REQUIRE(skep_options_set(options, "average_views", 0));
     skep_scene *handed_in = scene_hand_in(&made);
     skep_steps *steps = NULL;
     uint32_t count = 0;
     REQUIRE(skep_steps_create(handed_in, options, &steps));
     REQUIRE(skep_steps_get_count(steps, &count, NULL));
+    check_averaged(&made, handed_in, options);
     /* Steps need neither scene nor options any more. */
     skep_options_destroy(options);
     skep_scene_destroy(handed_in);
@@ -140,23 +192,8 @@ void test_own_maps(const char *folder) {
         states[view] = true_state(&made, steps, last, view);
     }
     check_guidance(&made, steps, last, states);
-    /* Finished as they are, true maps match well and are all validated. */
-    skep_result *result = NULL;
-    REQUIRE(skep_steps_finish(steps, 1, (const skep_state *const *)states, made.views, NULL, NULL,
-                              &result));
+    check_finished(&made, steps, states);
     skep_steps_destroy(steps);
-    view_maps maps = maps_of(result, 1);
-    CHECK(same_bytes(maps.depth[0], made.photographs[1].depth, 4 * scene_pixels(&made)),
-          "the maps given");
-    CHECK(maps.statistics.pixels[SKEP_PIXEL_VALIDATED] == scene_pixels(&made), "all are validated");
-    double sum = 0;
-    for (size_t i = 0; i < scene_pixels(&made); ++i) {
-        sum += maps.cost[i];
-    }
-    printf("mean cost of the true maps: %.3f\n", sum / scene_pixels(&made));
-    CHECK(scene_is_small() || sum < 0.25 * scene_pixels(&made), "%g", sum / scene_pixels(&made));
-    maps_free(&maps);
-    skep_result_destroy(result);
     for (uint32_t view = 0; view < made.views; ++view) {
         skep_state_destroy(states[view]);
     }

@@ -96,8 +96,10 @@ static void check_agreement(const skep_camera *camera, const view_maps *maps) {
               "cycle %zu", i);
     }
     const skep_cycle *last = &maps->cycles[maps->cycle_total - 1];
-    CHECK(last->reduction == 1 && last->validated == counts[SKEP_PIXEL_VALIDATED],
-          "the last cycle's check");
+    /* Closing what is left open makes validated pixels, and finishing takes none away. */
+    CHECK(last->reduction == 1 && last->validated <= counts[SKEP_PIXEL_VALIDATED],
+          "the last cycle's check found %llu, the map has %llu",
+          (unsigned long long)last->validated, (unsigned long long)counts[SKEP_PIXEL_VALIDATED]);
 }
 
 /* Every way to get a map gives the same values, and leaves alone what lies between rows. */
