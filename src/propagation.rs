@@ -33,22 +33,27 @@ pub fn offers(
     givers: &[Giver],
     cancelled: Cancelled,
 ) -> Result<Vec<Offer>> {
-    let nothing = || vec![Ranked::default(); camera.pixels()];
-    let from_one = |giver: &Giver| {
-        let mut offers = nothing();
-        give(camera, state, range, giver, &mut offers, cancelled).then_some(offers)
-    };
-    let merge = |mut ours: Vec<Ranked>, theirs: Vec<Ranked>| {
-        for (ours, theirs) in ours.iter_mut().zip(&theirs) {
-            ours.keep_better(theirs);
+    let blocks: Vec<(&Giver, usize)> = (givers.iter())
+        .flat_map(|giver| (0..giver.state.solutions.len()).step_by(BLOCK).map(move |first| (giver, first)))
+        .collect();
+    let lists = blocks.into_par_iter().map(|(giver, first)| match cancelled() {
+        true => Err(Error::Cancelled),
+        false => Ok(given(camera, state, range, giver, first)),
+    });
+    let lists: Vec<Vec<(usize, Ranked)>> = lists.collect::<Result<_>>()?;
+    let mut best = vec![Offer::default(); camera.pixels()];
+    best.par_chunks_mut(BLOCK).enumerate().for_each(|(block, best)| {
+        let first = block * BLOCK;
+        let mut ranked = vec![Ranked::default(); best.len()];
+        for list in &lists {
+            let here = &list[list.partition_point(|(target, _)| *target < first)..];
+            for (target, offer) in here.iter().take_while(|(target, _)| *target < first + best.len()) {
+                ranked[target - first].keep_better(offer);
+            }
         }
-        Some(ours)
-    };
-    let ranked = match givers.par_iter().map(from_one).try_reduce_with(merge) {
-        Some(ranked) => ranked.ok_or(Error::Cancelled)?,
-        None => nothing(),
-    };
-    Ok(ranked.into_iter().map(|ranked| ranked.offer).collect())
+        best.iter_mut().zip(ranked).for_each(|(best, ranked)| *best = ranked.offer);
+    });
+    Ok(best)
 }
 
 /// An offer and who makes it.
@@ -71,25 +76,22 @@ impl Ranked {
     }
 }
 
-/// Pixels between two looks whether to go on.
-const PATIENCE: usize = 1 << 16;
+/// Pixels that one thread takes at once, between two looks whether to go on.
+const BLOCK: usize = 1 << 13;
 
-/// Makes one view's offers; whether it was not cancelled.
-fn give(
+/// The offers that a view makes from a block of its pixels on, by the pixels they fall on.
+fn given(
     camera: &Camera,
     state: &ViewState,
     range: DepthRange,
     giver: &Giver,
-    offers: &mut [Ranked],
-    cancelled: Cancelled,
-) -> bool {
+    first: usize,
+) -> Vec<(usize, Ranked)> {
     let rotation = camera.rotation * giver.camera.rotation.transpose();
     let translation = camera.translation - rotation * giver.camera.translation;
     let width = giver.camera.width as usize;
-    for (pixel, solution) in giver.state.solutions.iter().enumerate() {
-        if pixel % PATIENCE == 0 && cancelled() {
-            return false;
-        }
+    let mut offers = Vec::new();
+    for (pixel, solution) in giver.state.solutions.iter().enumerate().skip(first).take(BLOCK) {
         if solution.depth <= 0.0 || solution.consistent == 0 {
             continue;
         }
@@ -100,10 +102,11 @@ fn give(
             && !is_settled(&state.solutions[target])
         {
             let offer = Offer { depth, normal: normal.as_vec3(), cost: giver.state.cost[pixel] };
-            offers[target].keep_better(&Ranked { offer, view: giver.view });
+            offers.push((target, Ranked { offer, view: giver.view }));
         }
     }
-    true
+    offers.sort_by_key(|(target, _)| *target);
+    offers
 }
 
 fn is_settled(solution: &Solution) -> bool {

@@ -28,14 +28,15 @@ struct Padded {
 }
 
 impl Padded {
-    fn new(width: usize, height: usize, value: impl Fn(usize) -> f32) -> Padded {
+    fn new(width: usize, height: usize, value: impl Fn(usize) -> f32 + Sync) -> Padded {
         let stride = width + 2 * RADIUS;
         let mut values = vec![0.0; stride * (height + 2 * RADIUS)];
-        for (y, row) in values[RADIUS * stride..].chunks_exact_mut(stride).take(height).enumerate() {
+        let rows = values[RADIUS * stride..].par_chunks_exact_mut(stride).take(height);
+        rows.enumerate().for_each(|(y, row)| {
             for (x, place) in row[RADIUS..][..width].iter_mut().enumerate() {
                 *place = value(y * width + x);
             }
-        }
+        });
         Padded { stride, values }
     }
 

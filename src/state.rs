@@ -43,10 +43,9 @@ impl ViewState {
 
     /// Marks each solution by what the check says of it.
     pub fn judge(&mut self, consistent: &[(u8, bool)]) {
-        for (solution, &(count, validated)) in self.solutions.iter_mut().zip(consistent) {
-            solution.consistent = count;
-            solution.validated = validated;
-        }
+        self.solutions.par_iter_mut().zip(consistent).for_each(|(solution, &(count, validated))| {
+            (solution.consistent, solution.validated) = (count, validated);
+        });
     }
 
     /// Brings the surface up to date with the solutions.
@@ -87,7 +86,7 @@ impl ViewState {
         };
         let solutions: Vec<Solution> = (0..fine.pixels()).into_par_iter().map(refine).collect();
         let surface = shown(fine, &solutions);
-        let cost = (0..fine.pixels()).map(|pixel| self.cost[parent(pixel)]).collect();
+        let cost = (0..fine.pixels()).into_par_iter().map(|pixel| self.cost[parent(pixel)]).collect();
         let sets = match self.sets.is_clear() {
             true => self.sets.clone(),
             false => self.sets.of((0..fine.pixels()).map(parent)),

@@ -69,6 +69,7 @@ def test_a_state_tells_what_it_is(scene, options):
 
 
 def test_a_run_can_start_from_the_hosts_own_maps(scene, options):
+    options["average_views"] = 0
     steps = skep.Steps(scene, options)
     last = len(steps) - 1
     states = [

@@ -19,4 +19,4 @@ pub use cost::CostRules;
 pub use food::{FoodSource, MIN_FACING};
 pub use onlooker::OnlookerRules;
 pub use random::{Random, stream};
-pub use schedule::{Assessment, BAND_ROWS, Search, assess};
+pub use schedule::{Assessment, Search, assess, band_rows};

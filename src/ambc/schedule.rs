@@ -16,10 +16,17 @@ use crate::state::Solution;
 use crate::views::{Reference, ViewRules, ViewSelector, ViewSets};
 use rayon::prelude::*;
 
-/// Rows of a band, the unit of work of a thread.
-pub const BAND_ROWS: usize = 8;
-/// Columns of a tile: with the rows of a band, its colonies and the parts of the sources they reach stay in cache.
+/// Sides of a tile: its colonies and the parts of the sources they reach stay in cache.
+const TILE_ROWS: usize = 8;
 const TILE_COLUMNS: usize = 64;
+/// Rows of the lowest bands, and bands for each thread that are worth them: threads that end early wait for the last.
+const MIN_BAND_ROWS: usize = 2;
+const BANDS_PER_THREAD: usize = 8;
+
+/// Rows of a band, the unit of work of a thread of the current rayon pool, in an image of this height.
+pub fn band_rows(height: usize) -> usize {
+    (height / (BANDS_PER_THREAD * rayon::current_num_threads())).clamp(MIN_BAND_ROWS, TILE_ROWS)
+}
 
 /// What one search depends on.
 pub struct Search<'a> {
@@ -113,6 +120,7 @@ impl Task for SearchTask<'_> {
         }
         counts.samples = counts.ncc_evaluations * search.window.samples();
         let best = (0..width * height)
+            .into_par_iter()
             .map(|pixel| {
                 let (x, y) = (pixel % width, pixel / width);
                 *colonies[colour(x, y)].best(x, y)
@@ -133,12 +141,12 @@ fn tiled(width: usize, rows: usize) -> impl Iterator<Item = (usize, usize)> {
 }
 
 /// Adds up what the bands did, unless one was cancelled.
-fn total(bands: impl ParallelIterator<Item = Option<Counts>>) -> Result<Counts> {
+fn total(bands: impl IndexedParallelIterator<Item = Option<Counts>>) -> Result<Counts> {
     let sum = |mut a: Counts, b: Counts| {
         a += b;
         Some(a)
     };
-    bands.try_reduce(Counts::default, sum).ok_or(Error::Cancelled)
+    bands.with_max_len(1).try_reduce(Counts::default, sum).ok_or(Error::Cancelled)
 }
 
 /// Section 5.1: settles the view set of every pixel, and the part of it to focus on, and fills its colony.
@@ -151,16 +159,16 @@ fn initialise<S: Simd>(
 ) -> Result<Counts> {
     let (width, height) = (search.width(), search.height());
     let words = sets.words_per_pixel();
-    let band_foods = BAND_ROWS * colonies[0].row_len();
+    let band_rows = band_rows(height);
     let row_foods = colonies[0].row_len();
     let [first, second] = colonies;
     let bands = first
         .foods
-        .par_chunks_mut(band_foods)
-        .zip(second.foods.par_chunks_mut(band_foods))
-        .zip(sets.words_mut().par_chunks_mut(BAND_ROWS * width * words))
-        .zip(focus.words_mut().par_chunks_mut(BAND_ROWS * width * words))
-        .zip(weak.par_chunks_mut(BAND_ROWS * width))
+        .par_chunks_mut(band_rows * row_foods)
+        .zip(second.foods.par_chunks_mut(band_rows * row_foods))
+        .zip(sets.words_mut().par_chunks_mut(band_rows * width * words))
+        .zip(focus.words_mut().par_chunks_mut(band_rows * width * words))
+        .zip(weak.par_chunks_mut(band_rows * width))
         .enumerate();
     total(bands.map(|(band, ((((first, second), sets), focus), weak))| {
         if (search.cancelled)() {
@@ -171,9 +179,9 @@ fn initialise<S: Simd>(
             || {
                 let mut evaluator = Evaluator::new(simd, search.reference, search.window, search.cost_rules);
                 let mut selector = ViewSelector::new(simd, search.reference, search.view_rules);
-                let rows = BAND_ROWS.min(height - band * BAND_ROWS);
+                let rows = band_rows.min(height - band * band_rows);
                 for (x, row) in tiled(width, rows) {
-                    let y = band * BAND_ROWS + row;
+                    let y = band * band_rows + row;
                     if !search.is_wanted(y * width + x) {
                         continue;
                     }
@@ -274,7 +282,8 @@ fn iterate<S: Simd>(
     let (width, height) = (search.width(), search.height());
     let row_foods = colonies.row_len();
     let stream = stream(&[search.stream, 1 + u64::from(iteration)]);
-    let bands = colonies.foods.par_chunks_mut(BAND_ROWS * row_foods).enumerate();
+    let band_rows = band_rows(height);
+    let bands = colonies.foods.par_chunks_mut(band_rows * row_foods).enumerate();
     total(bands.map(|(band, foods)| {
         if (search.cancelled)() {
             return None;
@@ -283,9 +292,9 @@ fn iterate<S: Simd>(
             #[inline(always)]
             || {
                 let mut evaluator = Evaluator::new(simd, search.reference, search.window, search.cost_rules);
-                let rows = BAND_ROWS.min(height - band * BAND_ROWS);
+                let rows = band_rows.min(height - band * band_rows);
                 for (x, row) in tiled(width, rows) {
-                    let y = band * BAND_ROWS + row;
+                    let y = band * band_rows + row;
                     let pixel = y * width + x;
                     if colour(x, y) != turn || !search.is_wanted(pixel) || weak[pixel] {
                         continue;
@@ -356,7 +365,7 @@ impl Task for AssessTask<'_> {
         let words = sets.words_per_pixel();
         let mut cost = vec![0.0; solutions.len()];
         let mut textured = vec![false; solutions.len()];
-        let band = BAND_ROWS * width;
+        let band = band_rows(search.height()) * width;
         let bands = (sets.words_mut().par_chunks_mut(band * words))
             .zip(cost.par_chunks_mut(band))
             .zip(textured.par_chunks_mut(band))

@@ -16,6 +16,7 @@ use crate::pool::JoinedPool;
 use crate::progress::{Hook, Phase, Progress, Tracker};
 use crate::scene::Scene;
 pub use prepare::Steps;
+use rayon::prelude::*;
 pub use schedule::Step;
 pub use search::{Offers, Verdicts};
 pub use state::{OwnMaps, State};
@@ -63,32 +64,50 @@ fn run(scene: &Scene, options: &Options, hook: Hook) -> Result<Reconstruction> {
 }
 
 /// One cycle: every view is searched from the states the last cycle left, then all are checked.
-fn cycle(steps: &Steps, step: usize, mut states: Vec<State>, tracker: &Tracker) -> Result<Vec<State>> {
+fn cycle(steps: &Steps, step: usize, states: Vec<State>, tracker: &Tracker) -> Result<Vec<State>> {
     let views = steps.views();
-    for (view, state) in states.iter_mut().enumerate() {
-        if steps.is_coarser(state, step) {
-            *state = steps.hand_up(step, view, state)?;
-        }
-    }
+    let states = two_at_a_time(states, |view, state| match steps.is_coarser(&state, step) {
+        true => steps.hand_up(step, view, &state),
+        false => Ok(state),
+    })?;
     let before = some(&states);
-    let mut searched = Vec::with_capacity(views);
-    for view in 0..views {
+    let searched = two_at_a_time(vec![(); views], |view, ()| {
         let progress = steps.all()[step].progress(Phase::Search, view, views);
         let advance = |units| tracker.advance(units, progress);
         let offers = steps.propagate_with(step, view, &before, &|| advance(0))?;
-        searched.push(steps.search_with(step, view, &before, Some(&offers), &advance)?);
-    }
+        steps.search_with(step, view, &before, Some(&offers), &advance)
+    })?;
     drop(states);
-    let mut verdicts = Vec::with_capacity(views);
-    for view in 0..views {
+    let found = some(&searched);
+    let verdicts = two_at_a_time(vec![(); views], |view, ()| {
         let progress = steps.all()[step].progress(Phase::Check, view, views);
-        verdicts.push(steps.check_with(step, view, &some(&searched), &|| tracker.advance(0, progress))?);
-    }
-    for ((view, state), verdicts) in searched.iter_mut().enumerate().zip(&verdicts) {
-        steps.mark(view, state, verdicts)?;
+        steps.check_with(step, view, &found, &|| tracker.advance(0, progress))
+    })?;
+    let searched = searched.into_iter().zip(&verdicts).collect();
+    two_at_a_time(searched, |view, (mut state, verdicts): (State, _)| {
+        steps.mark(view, &mut state, verdicts)?;
         state.forget_view_sets();
-    }
-    Ok(searched)
+        Ok(state)
+    })
+}
+
+/// Does the same to all views. The threads share the work on one view, and while there is not enough of it for all
+/// of them they work on another one; more views at a time would take more memory.
+fn two_at_a_time<T: Send, R: Send>(
+    views: Vec<T>,
+    each: impl Fn(usize, T) -> Result<R> + Sync,
+) -> Result<Vec<R>> {
+    let (even, odd): (Vec<_>, Vec<_>) = views.into_iter().enumerate().partition(|(view, _)| view % 2 == 0);
+    let in_turn = |views: Vec<(usize, T)>| -> Result<Vec<R>> {
+        views.into_iter().map(|(view, input)| each(view, input)).collect()
+    };
+    let (even, odd) = rayon::join(|| in_turn(even), || in_turn(odd));
+    let (mut even, mut odd) = (even?.into_iter(), odd?.into_iter());
+    Ok(std::iter::from_fn(|| {
+        std::mem::swap(&mut even, &mut odd);
+        odd.next()
+    })
+    .collect())
 }
 
 /// The states of all views as the steps take them.
@@ -100,15 +119,15 @@ fn some(states: &[State]) -> Vec<Option<&State>> {
 fn finish(steps: &Steps, states: &[State], tracker: &Tracker) -> Result<Vec<ViewResult>> {
     let views = steps.views();
     let last = steps.all().last().expect("options have a scale");
-    let finish_one = |view| {
+    let states = some(states);
+    two_at_a_time(vec![(); views], |view, ()| {
         let progress = last.progress(Phase::Check, view, views);
-        steps.finish_with(view, &some(states), &|units| tracker.advance(units, progress))
-    };
-    (0..views).map(finish_one).collect()
+        steps.finish_with(view, &states, &|units| tracker.advance(units, progress))
+    })
 }
 
 fn fuse(scene: &Scene, options: &Options, results: &[ViewResult], hook: Hook) -> Result<PointCloud> {
-    let maps: Vec<Maps> = results.iter().map(ViewResult::filtered).collect();
+    let maps: Vec<Maps> = results.par_iter().map(ViewResult::filtered).collect();
     let overlaps = fusion::overlaps(results.len(), scene.points());
     let views: Vec<FusionView> = (scene.views().iter().zip(&maps).zip(&overlaps))
         .map(|((view, maps), overlap)| FusionView {

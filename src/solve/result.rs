@@ -92,7 +92,7 @@ impl Steps {
         let mut sets = ViewSets::empty(offers.len(), reference.sources.len());
         let made = offers.iter().enumerate().filter(|(_, offer)| offer.depth > 0.0);
         let made = made.map(|(pixel, offer)| (pixel, offer.depth, offer.normal));
-        select_sets(reference, search.view_rules, &mut sets, made);
+        select_sets(reference, search.view_rules, &mut sets, &made.collect::<Vec<_>>());
         let offered = ViewState { solutions: offers, sets, ..ViewState::default() };
         let sources = self.found_by_sources(view, states);
         // What is offered has no cost of its own that speaks for it: the sources must agree more closely.

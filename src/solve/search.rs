@@ -2,7 +2,7 @@
 
 use super::prepare::Steps;
 use super::state::State;
-use crate::ambc::{BAND_ROWS, CostRules, FoodSource, Offer, OnlookerRules, Search, stream};
+use crate::ambc::{CostRules, FoodSource, Offer, OnlookerRules, Search, band_rows, stream};
 use crate::consistency::{self, ConsistencyRules};
 use crate::edges::trim;
 use crate::error::{Error, Result};
@@ -15,6 +15,7 @@ use crate::propagation::{self, Giver};
 use crate::smoothing::smooth;
 use crate::state::{Solution, ViewState};
 use crate::views::{Reference, Source, ViewRules, ViewSets, select_sets};
+use rayon::prelude::*;
 
 /// The planes other views offer to the pixels of a view; nothing on a scale's first cycle or with propagation off.
 #[derive(Debug, Clone)]
@@ -129,8 +130,8 @@ impl Steps {
             let is_guided = states.iter().any(Option::is_some);
             let reference = self.reference(step, view, states);
             // A band of one colour has half of its pixels.
-            let band = u64::from(camera.width) * BAND_ROWS as u64 * u64::from(schedule.scale.foods) / 2;
-            let cancelled = || advance(band);
+            let band = camera.width as usize * band_rows(camera.height as usize);
+            let cancelled = || advance(band as u64 * u64::from(schedule.scale.foods) / 2);
             let cycle = u64::from(schedule.cycle);
             let search = Search {
                 mask: mask.as_deref(),
@@ -143,11 +144,13 @@ impl Steps {
                 ..self.plain_search(step, &reference, is_guided, &cancelled)
             };
             let mut found = search.run()?;
-            let filled = fill(&reference, &mut found.best, &found.weak).into_iter().map(|pixel| {
+            let filled = fill(&reference, &mut found.best, &found.weak);
+            let plane = |&pixel: &usize| {
                 let FoodSource { depth, normal, .. } = found.best[pixel];
                 (pixel, depth, normal)
-            });
-            select_sets(&reference, search.view_rules, &mut found.sets, filled);
+            };
+            let filled: Vec<_> = filled.iter().map(plane).collect();
+            select_sets(&reference, search.view_rules, &mut found.sets, &filled);
             state.counts += found.counts;
             let solution = |food: &FoodSource| Solution {
                 depth: food.depth,
@@ -155,8 +158,8 @@ impl Steps {
                 ..Solution::default()
             };
             state.solved = ViewState {
-                solutions: found.best.iter().map(solution).collect(),
-                cost: found.best.iter().map(|food| food.cost).collect(),
+                solutions: found.best.par_iter().map(solution).collect(),
+                cost: found.best.par_iter().map(|food| food.cost).collect(),
                 sets: found.sets,
                 surface: Vec::new(),
             };
@@ -165,7 +168,7 @@ impl Steps {
         state.cycles.push(CycleRecord {
             reduction: schedule.reduction(),
             cycle: schedule.cycle,
-            pixels: solutions.iter().filter(|solution| solution.depth > 0.0).count() as u64,
+            pixels: solutions.par_iter().filter(|solution| solution.depth > 0.0).count() as u64,
             changed: count_changed(own.map_or(&[], |own| &own.solved.solutions), solutions),
             validated: 0,
         });
@@ -332,5 +335,5 @@ fn count_changed(before: &[Solution], after: &[Solution]) -> u64 {
         let before = before.get(*pixel).map_or(0.0, |solution| solution.depth);
         solution.depth > 0.0 && (solution.depth - before).abs() > CHANGE * solution.depth
     };
-    after.iter().enumerate().filter(changed).count() as u64
+    after.par_iter().enumerate().filter(changed).count() as u64
 }

@@ -6,6 +6,7 @@ use crate::maps::{Counts, CycleRecord, Maps};
 use crate::state::{Solution, ViewState};
 use crate::views::ViewSets;
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// What is known of one view after it was searched in a step or, once it is marked, after the check of that step.
 #[derive(Debug, Clone)]
@@ -175,7 +176,7 @@ pub(super) fn is_unit(normal: Vec3) -> bool {
 /// Depth and normal of every solution.
 pub(super) fn maps_of(solutions: &[Solution]) -> Maps {
     Maps {
-        depth: solutions.iter().map(|solution| solution.depth).collect(),
-        normal: solutions.iter().map(|solution| solution.normal.to_array()).collect(),
+        depth: solutions.par_iter().map(|solution| solution.depth).collect(),
+        normal: solutions.par_iter().map(|solution| solution.normal.to_array()).collect(),
     }
 }

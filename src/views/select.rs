@@ -5,6 +5,7 @@ use super::{Reference, Source, ViewSets};
 use crate::options::Options;
 use crate::simd::{LANES, Scalar, Simd};
 use glam::Vec3;
+use rayon::prelude::*;
 
 type Lanes = [f32; LANES];
 
@@ -128,13 +129,24 @@ pub fn select_sets(
     reference: &Reference,
     rules: ViewRules,
     sets: &mut ViewSets,
-    solutions: impl IntoIterator<Item = (usize, f32, Vec3)>,
+    solutions: &[(usize, f32, Vec3)],
 ) {
     let words = sets.words_per_pixel();
-    // Every back-end gives the same bits.
-    let mut selector = ViewSelector::new(Scalar, reference, rules);
-    for (pixel, depth, normal) in solutions {
-        let at = ((pixel % reference.image.width) as f32, (pixel / reference.image.width) as f32);
-        selector.select(&mut sets.words_mut()[pixel * words..][..words], at, depth, normal);
+    let mut selected = vec![0; solutions.len() * words];
+    let groups =
+        selected.par_chunks_mut(SELECTED_AT_ONCE * words).zip(solutions.par_chunks(SELECTED_AT_ONCE));
+    groups.for_each(|(selected, solutions)| {
+        // Every back-end gives the same bits.
+        let mut selector = ViewSelector::new(Scalar, reference, rules);
+        for (set, &(pixel, depth, normal)) in selected.chunks_exact_mut(words).zip(solutions) {
+            let at = ((pixel % reference.image.width) as f32, (pixel / reference.image.width) as f32);
+            selector.select(set, at, depth, normal);
+        }
+    });
+    for (set, &(pixel, ..)) in selected.chunks_exact(words).zip(solutions) {
+        sets.words_mut()[pixel * words..][..words].copy_from_slice(set);
     }
 }
+
+/// Pixels whose sets one thread selects at once.
+const SELECTED_AT_ONCE: usize = 1 << 10;

@@ -6,9 +6,11 @@ use crate::progress::Display;
 use crate::report::{Report, Totals};
 use crate::stopwatch::{Stage, Stopwatch};
 use crate::{Failure, streams};
+use rayon::prelude::*;
 use skep::io::{SceneFolder, Workspace, read_scene};
 use skep::{Error, Options, Outcome, Progress, Reconstruction, Result, Scene};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// Runs the command.
@@ -33,7 +35,7 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
     stopwatch.enter(Stage::Writing);
     display.say(&format!("writing {}", output.display()));
     let mut report = Report::new(&scene, &arguments.preset, &options, &result);
-    write(&output, &arguments.scene, &scene, &result, &interrupt)?;
+    write(&output, &arguments.scene, &scene, &result, options.threads, &interrupt)?;
     report.set_times(stopwatch.times());
     report.write(&report_path(&output))?;
 
@@ -72,6 +74,7 @@ fn write(
     folder: &Path,
     scene: &Scene,
     result: &Reconstruction,
+    threads: usize,
     interrupt: &Interrupt,
 ) -> Result<()> {
     // A report says that everything beside it is there and belongs together: an older one must not say so meanwhile.
@@ -83,17 +86,33 @@ fn write(
         _ => (),
     }
     let workspace = Workspace::new(output);
-    let views = scene.views().iter().zip(&result.views);
-    for (written, (view, result)) in views.enumerate() {
+    let written = AtomicUsize::new(0);
+    let views = scene.views().par_iter().zip(&result.views).with_max_len(1);
+    let all = pool(threads)?.install(|| {
+        views.try_for_each(|(view, result)| {
+            interrupt.check()?;
+            workspace.write_view(&view.name, &view.camera, result)?;
+            written.fetch_add(1, Ordering::Relaxed);
+            Ok(())
+        })
+    });
+    all.inspect_err(|error| {
+        let written = written.load(Ordering::Relaxed);
         let kept = format!("{written} of {} views are written and whole", scene.views().len());
-        interrupt.check().inspect_err(|error| explain_interruption(error, &kept))?;
-        workspace.write_view(&view.name, &view.camera, result)?;
-    }
+        explain_interruption(error, &kept);
+    })?;
     let kept = "the maps of all views are written and whole; `skep fuse` makes the cloud from them";
     interrupt.check().inspect_err(|error| explain_interruption(error, kept))?;
     workspace.write_lists(scene.views().iter().map(|view| view.name.as_str()))?;
     workspace.adopt(&SceneFolder::find(folder)?)?;
     Workspace::write_cloud(&workspace.cloud(), &result.points)
+}
+
+/// Threads for what the library has no part in; 0 takes one for each core.
+fn pool(threads: usize) -> Result<rayon::ThreadPool> {
+    let expected = "a number of threads that the system can start";
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|error| Error::argument("--threads", threads, format!("{expected} ({error})")))
 }
 
 fn report_path(output: &Path) -> PathBuf {
