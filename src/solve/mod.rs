@@ -34,6 +34,8 @@ pub fn reconstruct(scene: &Scene, options: &Options, hook: Hook) -> Result<Recon
     JoinedPool::new(options.threads)?.install(|| run(scene, options, hook))
 }
 
+/// Threads that find work enough in one view most of the time.
+const THREADS_PER_VIEW: usize = 4;
 /// Share of the whole work that fusion is reckoned at.
 const FUSION_SHARE: f64 = 0.03;
 
@@ -66,12 +68,12 @@ fn run(scene: &Scene, options: &Options, hook: Hook) -> Result<Reconstruction> {
 /// One cycle: every view is searched from the states the last cycle left, then all are checked.
 fn cycle(steps: &Steps, step: usize, states: Vec<State>, tracker: &Tracker) -> Result<Vec<State>> {
     let views = steps.views();
-    let states = two_at_a_time(states, |view, state| match steps.is_coarser(&state, step) {
+    let states = each_view(states, |view, state| match steps.is_coarser(&state, step) {
         true => steps.hand_up(step, view, &state),
         false => Ok(state),
     })?;
     let before = some(&states);
-    let searched = two_at_a_time(vec![(); views], |view, ()| {
+    let searched = each_view(vec![(); views], |view, ()| {
         let progress = steps.all()[step].progress(Phase::Search, view, views);
         let advance = |units| tracker.advance(units, progress);
         let offers = steps.propagate_with(step, view, &before, &|| advance(0))?;
@@ -79,35 +81,33 @@ fn cycle(steps: &Steps, step: usize, states: Vec<State>, tracker: &Tracker) -> R
     })?;
     drop(states);
     let found = some(&searched);
-    let verdicts = two_at_a_time(vec![(); views], |view, ()| {
+    let verdicts = each_view(vec![(); views], |view, ()| {
         let progress = steps.all()[step].progress(Phase::Check, view, views);
         steps.check_with(step, view, &found, &|| tracker.advance(0, progress))
     })?;
     let searched = searched.into_iter().zip(&verdicts).collect();
-    two_at_a_time(searched, |view, (mut state, verdicts): (State, _)| {
+    each_view(searched, |view, (mut state, verdicts): (State, _)| {
         steps.mark(view, &mut state, verdicts)?;
         state.forget_view_sets();
         Ok(state)
     })
 }
 
-/// Does the same to all views. The threads share the work on one view, and while there is not enough of it for all
-/// of them they work on another one; more views at a time would take more memory.
-fn two_at_a_time<T: Send, R: Send>(
-    views: Vec<T>,
-    each: impl Fn(usize, T) -> Result<R> + Sync,
-) -> Result<Vec<R>> {
-    let (even, odd): (Vec<_>, Vec<_>) = views.into_iter().enumerate().partition(|(view, _)| view % 2 == 0);
-    let in_turn = |views: Vec<(usize, T)>| -> Result<Vec<R>> {
-        views.into_iter().map(|(view, input)| each(view, input)).collect()
+/// Does the same to all views, some at a time. The threads share the work on one view, and while there is not enough of
+/// it for all of them they work on another one; more views at a time would take more memory.
+fn each_view<T: Send, R: Send>(views: Vec<T>, each: impl Fn(usize, T) -> Result<R> + Sync) -> Result<Vec<R>> {
+    let at_a_time = 1 + rayon::current_num_threads().div_ceil(THREADS_PER_VIEW);
+    let mut turns: Vec<Vec<(usize, T)>> = (0..at_a_time).map(|_| Vec::new()).collect();
+    for (view, input) in views.into_iter().enumerate() {
+        turns[view % at_a_time].push((view, input));
+    }
+    let one_by_one = |views: Vec<(usize, T)>| -> Result<Vec<(usize, R)>> {
+        views.into_iter().map(|(view, input)| Ok((view, each(view, input)?))).collect()
     };
-    let (even, odd) = rayon::join(|| in_turn(even), || in_turn(odd));
-    let (mut even, mut odd) = (even?.into_iter(), odd?.into_iter());
-    Ok(std::iter::from_fn(|| {
-        std::mem::swap(&mut even, &mut odd);
-        odd.next()
-    })
-    .collect())
+    let done: Vec<_> = turns.into_par_iter().with_max_len(1).map(one_by_one).collect::<Result<_>>()?;
+    let mut done: Vec<(usize, R)> = done.into_iter().flatten().collect();
+    done.sort_unstable_by_key(|(view, _)| *view);
+    Ok(done.into_iter().map(|(_, result)| result).collect())
 }
 
 /// The states of all views as the steps take them.
@@ -120,7 +120,7 @@ fn finish(steps: &Steps, states: &[State], tracker: &Tracker) -> Result<Vec<View
     let views = steps.views();
     let last = steps.all().last().expect("options have a scale");
     let states = some(states);
-    two_at_a_time(vec![(); views], |view, ()| {
+    each_view(vec![(); views], |view, ()| {
         let progress = last.progress(Phase::Check, view, views);
         steps.finish_with(view, &states, &|units| tracker.advance(units, progress))
     })
