@@ -83,16 +83,19 @@ pub fn check(
     cancelled: Cancelled,
 ) -> Result<Vec<(u8, bool)>> {
     let width = reference.image.width;
-    let judge = |(pixel, solution): (usize, &Solution)| {
+    let judge = |(pixel, solution): (usize, &Solution), met: &mut Vec<Met>| {
         if solution.depth <= 0.0 {
             return (0, false);
         }
-        let (x, y) = ((pixel % width) as f32, (pixel / width) as f32);
+        let at = ((pixel % width) as f32, (pixel / width) as f32);
+        // All are looked up before any is judged: the look-ups, far apart in memory, then do not wait for each other.
+        met.clear();
+        met.extend(state.sets.iter(pixel).filter_map(|index| {
+            sources[index].and_then(|found| meet(&reference.sources[index], found, at, solution))
+        }));
         let (mut consistent, mut speaking) = (0, 0);
-        for index in state.sets.iter(pixel) {
-            let source = &reference.sources[index];
-            let Some(state) = sources[index] else { continue };
-            match verdict(source, state, (x, y), solution, rules) {
+        for Met { depth, normal, own } in met {
+            match rules.judge(*depth, *normal, own) {
                 Verdict::Consistent => (consistent, speaking) = (consistent + 1, speaking + 1),
                 Verdict::Inconsistent => speaking += 1,
                 Verdict::Abstains => {}
@@ -106,8 +109,10 @@ pub fn check(
         if cancelled() {
             return Err(Error::Cancelled);
         }
-        let pixels = (band * BAND..).zip(solutions).map(judge);
-        verdicts.iter_mut().zip(pixels).for_each(|(verdict, found)| *verdict = found);
+        let mut met = Vec::with_capacity(sources.len());
+        for (verdict, pixel) in verdicts.iter_mut().zip((band * BAND..).zip(solutions)) {
+            *verdict = judge(pixel, &mut met);
+        }
         Ok(())
     })?;
     Ok(verdicts)
@@ -116,18 +121,23 @@ pub fn check(
 /// Pixels judged at once, between two looks whether to go on.
 const BAND: usize = 1 << 12;
 
-/// What one source view says; one that has the point outside its image abstains.
-fn verdict(
-    source: &Source,
-    state: &ViewState,
-    (x, y): (f32, f32),
-    solution: &Solution,
-    rules: &ConsistencyRules,
-) -> Verdict {
+/// A solution in a source view's frame, and what that view found there.
+struct Met {
+    depth: f32,
+    normal: Vec3,
+    own: Solution,
+}
+
+/// Looks up what a source view found where a solution falls; `None` outside its image: it abstains.
+fn meet(source: &Source, found: &ViewState, (x, y): (f32, f32), solution: &Solution) -> Option<Met> {
     let point = source.pose.at_infinity(x, y) + source.pose.epipole / solution.depth;
-    let Some(at) = source.project(point) else { return Verdict::Abstains };
+    let at = source.project(point)?;
     let nearest = (at.y + 0.5) as usize * source.image.width + (at.x + 0.5) as usize;
-    rules.judge(point.z * solution.depth, source.rotation * solution.normal, &state.solutions[nearest])
+    Some(Met {
+        depth: point.z * solution.depth,
+        normal: source.rotation * solution.normal,
+        own: found.solutions[nearest],
+    })
 }
 
 #[cfg(test)]

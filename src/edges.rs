@@ -6,10 +6,12 @@ use crate::ambc::MIN_FACING;
 use crate::camera::Camera;
 use crate::image::PackedImage;
 use crate::kernels::SlantedPlane;
+use crate::padded::Padded;
 use crate::scene::DepthRange;
 use crate::state::{Solution, surface};
 use glam::{DVec2, Vec3};
 use rayon::prelude::*;
+use std::ops::RangeInclusive;
 
 /// Half side of the neighbourhood, in pixels: more than that surfaces are hardly widened.
 const RADIUS: i32 = 6;
@@ -80,25 +82,28 @@ pub fn trim(
     let mut moved = Moved::everywhere(image.width, image.height);
     for _ in 0..passes {
         let planes = surface(camera, solutions);
+        let near_edges = NearEdges::new((image.width, image.height), &planes, is_last);
         let edges =
             Edges { camera, image, range, planes: &planes, before: solutions, weights: &weights, is_last };
         let width = image.width;
-        let trimmed: Vec<Solution> = (0..solutions.len())
-            .into_par_iter()
-            .with_min_len(width)
-            .map(|pixel| {
-                let solution = edges.before[pixel];
-                // Where nothing moved in the pass before, nothing moves in this one.
-                if !solution.validated || !moved.is_near(pixel % width, pixel / width) {
-                    return solution;
+        let mut trimmed = solutions.to_vec();
+        trimmed.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+            // Where nothing moved in the pass before, nothing moves in this one.
+            if !moved.is_near_row(y) {
+                return;
+            }
+            let near_edges = near_edges.of_row(y, width);
+            for (x, solution) in row.iter_mut().enumerate() {
+                if !near_edges[x] || !solution.validated || !moved.is_near(x, y) {
+                    continue;
                 }
-                match edges.judge((pixel % width, pixel / width)) {
-                    Belongs::ToItsOwn => solution,
-                    Belongs::Behind { depth, normal } => Solution { depth, normal, ..solution },
-                    Belongs::Nowhere => Solution { validated: false, ..solution },
+                match edges.judge((x, y)) {
+                    Belongs::ToItsOwn => {}
+                    Belongs::Behind { depth, normal } => (solution.depth, solution.normal) = (depth, normal),
+                    Belongs::Nowhere => solution.validated = false,
                 }
-            })
-            .collect();
+            }
+        });
         moved = Moved::between(solutions, &trimmed, width);
         solutions.copy_from_slice(&trimmed);
     }
@@ -131,12 +136,66 @@ impl Moved {
 
     /// Whether anything in the neighbourhood of a pixel moved.
     fn is_near(&self, x: usize, y: usize) -> bool {
-        let rows = self.blocks.len() / self.columns;
-        let span = |at: usize, count: usize| {
-            let last = (at + RADIUS as usize) / Moved::BLOCK;
-            at.saturating_sub(RADIUS as usize) / Moved::BLOCK..=last.min(count - 1)
+        let columns = Moved::span(x, self.columns);
+        self.rows_near(y).any(|row| row[columns.clone()].contains(&true))
+    }
+
+    /// Whether anything in the neighbourhood of a row moved.
+    fn is_near_row(&self, y: usize) -> bool {
+        self.rows_near(y).any(|row| row.contains(&true))
+    }
+
+    fn rows_near(&self, y: usize) -> impl Iterator<Item = &[bool]> {
+        let rows = Moved::span(y, self.blocks.len() / self.columns);
+        self.blocks.chunks_exact(self.columns).take(rows.end() + 1).skip(*rows.start())
+    }
+
+    /// The blocks the neighbourhood reaches along one axis.
+    fn span(at: usize, count: usize) -> RangeInclusive<usize> {
+        let last = (at + RADIUS as usize) / Moved::BLOCK;
+        at.saturating_sub(RADIUS as usize) / Moved::BLOCK..=last.min(count - 1)
+    }
+}
+
+/// Tells, row by row, which pixels have an edge nearby: the others are their surface's own.
+struct NearEdges {
+    /// Of the validated planes; not a number where nothing is compared.
+    inverse_depth: Padded,
+    slope_x: Padded,
+    slope_y: Padded,
+}
+
+impl NearEdges {
+    /// Empty pixels lie behind all others where no search follows, and say nothing where one does.
+    fn new(size: (usize, usize), planes: &[SlantedPlane], is_last: bool) -> NearEdges {
+        let empty = if is_last { 0.0 } else { f32::NAN };
+        let padded = |beyond, value: &(dyn Fn(&SlantedPlane) -> f32 + Sync)| {
+            Padded::new(size, (RADIUS as usize, beyond), |pixel| value(&planes[pixel]))
         };
-        span(y, rows).any(|row| span(x, self.columns).any(|column| self.blocks[row * self.columns + column]))
+        NearEdges {
+            inverse_depth: padded(f32::NAN, &|plane| match plane.inverse_depth {
+                inverse_depth if inverse_depth > 0.0 => inverse_depth,
+                _ => empty,
+            }),
+            slope_x: padded(0.0, &|plane| plane.slope_x),
+            slope_y: padded(0.0, &|plane| plane.slope_y),
+        }
+    }
+
+    fn of_row(&self, y: usize, width: usize) -> Vec<bool> {
+        let own = self.inverse_depth.row(y, (0, 0), width);
+        let mut is_near = vec![false; width];
+        for (dx, dy) in PROBES {
+            let inverse_depth = self.inverse_depth.row(y, (dx, dy), width);
+            let slope_x = self.slope_x.row(y, (dx, dy), width);
+            let slope_y = self.slope_y.row(y, (dx, dy), width);
+            let (dx, dy) = (dx as f32, dy as f32);
+            for x in 0..width {
+                let there = inverse_depth[x] - slope_x[x] * dx - slope_y[x] * dy;
+                is_near[x] |= there < own[x] * (1.0 - BEHIND);
+            }
+        }
+        is_near
     }
 }
 
@@ -169,13 +228,6 @@ impl Edges<'_> {
     fn judge(&self, at: (usize, usize)) -> Belongs {
         let pixel = at.1 * self.image.width + at.0;
         let own = self.planes[pixel].inverse_depth;
-        let is_edge = |&offset: &(i32, i32)| {
-            let difference = self.neighbour(at, offset).map(|other| self.difference(own, other, offset));
-            difference.is_some_and(|difference| difference.map_or(self.is_last, |d| d < -BEHIND))
-        };
-        if !PROBES.iter().any(is_edge) {
-            return Belongs::ToItsOwn;
-        }
         let grey = self.image.grey(at.0, at.1);
         let (mut same, mut behind, mut empty) = (1.0, 0.0, 0.0);
         let (mut inverse_depth, mut normal) = (0.0, Vec3::ZERO);

@@ -23,6 +23,7 @@ pub mod kernels;
 mod maps;
 mod options;
 mod outcome;
+mod padded;
 mod pool;
 mod progress;
 mod propagation;

@@ -4,6 +4,7 @@
 use crate::ambc::MIN_FACING;
 use crate::camera::Camera;
 use crate::image::PackedImage;
+use crate::padded::Padded;
 use crate::scene::DepthRange;
 use crate::state::{Solution, surface};
 use glam::{DVec2, Vec3};
@@ -20,32 +21,6 @@ const NORMAL_SCALE: f32 = 0.134;
 const GREY_SIGMA: f32 = 10.0;
 /// Distance in pixels at which it counts for 1 / sqrt(e).
 const SPATIAL_SIGMA: f32 = 2.7;
-
-/// A map with a border of [`RADIUS`] zeros.
-struct Padded {
-    stride: usize,
-    values: Vec<f32>,
-}
-
-impl Padded {
-    fn new(width: usize, height: usize, value: impl Fn(usize) -> f32 + Sync) -> Padded {
-        let stride = width + 2 * RADIUS;
-        let mut values = vec![0.0; stride * (height + 2 * RADIUS)];
-        let rows = values[RADIUS * stride..].par_chunks_exact_mut(stride).take(height);
-        rows.enumerate().for_each(|(y, row)| {
-            for (x, place) in row[RADIUS..][..width].iter_mut().enumerate() {
-                *place = value(y * width + x);
-            }
-        });
-        Padded { stride, values }
-    }
-
-    /// The row `y + dy`, from `dx` on.
-    fn row(&self, y: usize, (dx, dy): (i32, i32), width: usize) -> &[f32] {
-        let row = (y + RADIUS).wrapping_add_signed(dy as isize);
-        &self.values[row * self.stride + RADIUS.wrapping_add_signed(dx as isize)..][..width]
-    }
-}
 
 /// What the neighbours are asked for; planes as inverse depth, 0 where nothing is validated.
 struct Surface {
@@ -68,16 +43,13 @@ pub fn smooth(camera: &Camera, image: &PackedImage, range: DepthRange, solutions
     let ray = |x: usize, y: usize| camera.ray(DVec2::new(x as f64, y as f64)).as_vec3();
     let surface = {
         let planes = surface(camera, solutions);
+        let padded =
+            |value: &(dyn Fn(usize) -> f32 + Sync)| Padded::new((width, height), (RADIUS, 0.0), value);
         Surface {
-            inverse_depth: Padded::new(width, height, |pixel| planes[pixel].inverse_depth),
-            slope: [
-                Padded::new(width, height, |pixel| planes[pixel].slope_x),
-                Padded::new(width, height, |pixel| planes[pixel].slope_y),
-            ],
-            normal: std::array::from_fn(|axis| {
-                Padded::new(width, height, |pixel| solutions[pixel].normal[axis])
-            }),
-            grey: Padded::new(width, height, |pixel| f32::from(image.grey(pixel % width, pixel / width))),
+            inverse_depth: padded(&|pixel| planes[pixel].inverse_depth),
+            slope: [padded(&|pixel| planes[pixel].slope_x), padded(&|pixel| planes[pixel].slope_y)],
+            normal: std::array::from_fn(|axis| padded(&|pixel| solutions[pixel].normal[axis])),
+            grey: padded(&|pixel| f32::from(image.grey(pixel % width, pixel / width))),
         }
     };
     solutions.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
