@@ -238,16 +238,22 @@ impl Options {
         }
     }
 
-    /// The default with fewer iterations and source views: to look at a scene, or where time is short.
+    /// Most of the search on half size, one look at full size, and fewer source views: to look at a scene, or where time is
+    /// short. What is searched less takes more from its neighbours.
     pub fn fast() -> Options {
         Options {
             scales: vec![
-                Scale { halvings: 1, foods: 3, first_iterations: 4, cycles: 2, cycle_iterations: 1 },
-                Scale { halvings: 0, foods: 2, first_iterations: 1, cycles: 1, cycle_iterations: 1 },
+                Scale { halvings: 1, foods: 2, first_iterations: 4, cycles: 3, cycle_iterations: 1 },
+                Scale { halvings: 0, foods: 2, first_iterations: 0, cycles: 0, cycle_iterations: 1 },
             ],
-            max_sources: 10,
-            smoothness: 0.3,
-            reward: 0.05,
+            max_sources: 8,
+            focused_views: 4,
+            aggregation: Aggregation::BestViews(3),
+            restart_spread: 0.005,
+            smoothness: 0.2,
+            neighbours_drawn: 6,
+            plane_fit: 0.03,
+            smoothing_passes: 2,
             ..Options::default()
         }
     }
