@@ -18,6 +18,7 @@ fn fusion(criterion: &mut Criterion) {
         .map(|((view, maps), overlap)| FusionView {
             camera: &view.camera,
             maps,
+            outcome: None,
             picture: Some(&view.picture),
             overlap,
         })

@@ -11,7 +11,7 @@ mod source;
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::image::Picture;
-use crate::maps::{Maps, PointCloud};
+use crate::maps::{Maps, Outcome, PointCloud};
 use crate::options::FusionOptions;
 use crate::progress::{Hook, Phase, Progress};
 use average::{Member, average};
@@ -28,6 +28,8 @@ pub struct FusionView<'a> {
     pub camera: &'a Camera,
     /// Depth and normal, one each a pixel. A depth that is not a finite number above 0 is no estimate.
     pub maps: &'a Maps,
+    /// What became of each pixel: only validated ones are estimates. Without it all with a depth are.
+    pub outcome: Option<&'a [Outcome]>,
     /// For the colours; grey (128) without.
     pub picture: Option<&'a Picture>,
     /// The views that may see the same surface, as indices into the list of views.
@@ -83,10 +85,15 @@ fn check_view(views: &[FusionView], index: usize) -> Result<()> {
     let (view, name) = (&views[index], format!("views[{index}]"));
     view.camera.check(&format!("{name}.camera"))?;
     let pixels = view.camera.pixels();
-    for (map, len) in [("depth", view.maps.depth.len()), ("normal", view.maps.normal.len())] {
-        if len != pixels {
+    let lengths = [
+        ("maps.depth", Some(view.maps.depth.len())),
+        ("maps.normal", Some(view.maps.normal.len())),
+        ("outcome", view.outcome.map(<[Outcome]>::len)),
+    ];
+    for (map, len) in lengths {
+        if let Some(len) = len.filter(|len| *len != pixels) {
             let expected = format!("one for each of the camera's {pixels} pixels");
-            return Err(Error::argument(format!("{name}.maps.{map}"), format!("{len} values"), expected));
+            return Err(Error::argument(format!("{name}.{map}"), format!("{len} values"), expected));
         }
     }
     if let Some(picture) = view.picture
@@ -116,9 +123,12 @@ fn append(cloud: &mut PointCloud, points: &PointCloud) {
 }
 
 /// Depth and unit normal of a pixel, `None` where there is no usable estimate.
-fn estimate(maps: &Maps, pixel: usize) -> Option<(f64, DVec3)> {
-    let depth = maps.depth[pixel];
-    let normal = DVec3::from_array(maps.normal[pixel].map(f64::from)).try_normalize()?;
+fn estimate(view: &FusionView, pixel: usize) -> Option<(f64, DVec3)> {
+    if view.outcome.is_some_and(|outcome| outcome[pixel] != Outcome::Validated) {
+        return None;
+    }
+    let depth = view.maps.depth[pixel];
+    let normal = DVec3::from_array(view.maps.normal[pixel].map(f64::from)).try_normalize()?;
     (depth > 0.0 && depth.is_finite()).then_some((f64::from(depth), normal))
 }
 
@@ -158,7 +168,7 @@ impl<'a> Reference<'a> {
             if self.used[self.index][pixel].load(Ordering::Relaxed) {
                 continue;
             }
-            let Some((depth, normal)) = estimate(view.maps, pixel) else { continue };
+            let Some((depth, normal)) = estimate(view, pixel) else { continue };
             let position = DVec2::new(f64::from(column), f64::from(row));
             let start = Member {
                 view: self.index as u32,

@@ -21,6 +21,7 @@ fn fusion_views<'a>(made: &'a Procedural, maps: &'a [Maps], overlap: &'a [Vec<u3
     let view = |index: usize| FusionView {
         camera: &made.views[index].camera,
         maps: &maps[index],
+        outcome: None,
         picture: Some(&made.views[index].picture),
         overlap: &overlap[index],
     };

@@ -119,6 +119,7 @@ pub unsafe extern "C" fn skep_fuse(
             .map(|view| FusionView {
                 camera: &view.camera,
                 maps: &view.maps,
+                outcome: None,
                 picture: view.picture.as_ref(),
                 overlap: view.overlap,
             })

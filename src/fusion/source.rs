@@ -67,7 +67,7 @@ impl<'a> Source<'a> {
             return Opinion::None;
         };
         let pixel = row as usize * camera.width as usize + column as usize;
-        let Some((depth, normal)) = estimate(self.view.maps, pixel) else { return Opinion::None };
+        let Some((depth, normal)) = estimate(self.view, pixel) else { return Opinion::None };
         let difference = depth - point.z;
         if difference > CONFLICT_TOLERANCES * self.depth_tolerance * point.z {
             return Opinion::SeesThrough;

@@ -10,14 +10,16 @@ mod state;
 
 use crate::error::Result;
 use crate::fusion::{self, FusionView};
-use crate::maps::{Maps, PointCloud, Reconstruction, ViewResult};
+use crate::maps::{PointCloud, Reconstruction, ViewResult};
 use crate::options::Options;
 use crate::pool::JoinedPool;
 use crate::progress::{Hook, Phase, Progress, Tracker};
 use crate::scene::Scene;
+use crate::views::ShownPlane;
 pub use prepare::Steps;
 use rayon::prelude::*;
 pub use schedule::Step;
+use search::Shown;
 pub use search::{Offers, Verdicts};
 pub use state::{OwnMaps, State};
 use std::ops::ControlFlow;
@@ -59,10 +61,11 @@ fn run(scene: &Scene, options: &Options, hook: Hook) -> Result<Reconstruction> {
         next = steps.next(step, &some(&states))?;
         tracker.jump_to(work_before(next.unwrap_or(steps.all().len())));
     }
-    let views = finish(&steps, &states, &tracker)?;
-    drop(states);
+    let views = finish(&steps, states, &tracker)?;
+    let warnings = steps.warnings().to_vec();
+    drop(steps);
     let points = fuse(scene, options, &views, hook)?;
-    Ok(Reconstruction { views, points, warnings: steps.warnings().to_vec() })
+    Ok(Reconstruction { views, points, warnings })
 }
 
 /// One cycle: every view is searched from the states the last cycle left, then all are checked.
@@ -72,14 +75,20 @@ fn cycle(steps: &Steps, step: usize, states: Vec<State>, tracker: &Tracker) -> R
         true => steps.hand_up(step, view, &state),
         false => Ok(state),
     })?;
+    let searching = |view| steps.all()[step].progress(Phase::Search, view, views);
     let before = some(&states);
-    let searched = each_view(vec![(); views], |view, ()| {
-        let progress = steps.all()[step].progress(Phase::Search, view, views);
-        let advance = |units| tracker.advance(units, progress);
-        let offers = steps.propagate_with(step, view, &before, &|| advance(0))?;
-        steps.search_with(step, view, &before, Some(&offers), &advance)
+    let offers = each_view(vec![(); views], |view, ()| {
+        steps.propagate_with(step, view, &before, &|| tracker.advance(0, searching(view)))
     })?;
-    drop(states);
+    // From here on a view's own state is of no use to the others, and goes as soon as the view is searched.
+    let (surfaces, owns) = shown(states, views);
+    let given = owns.into_iter().zip(offers).collect();
+    let searched = each_view(given, |view, (own, offers): (Option<State>, Offers)| {
+        let shown = Shown { surfaces: &|view| &surfaces[view], is_guided: own.is_some() };
+        let advance = |units| tracker.advance(units, searching(view));
+        steps.search_from((step, view), own.as_ref(), shown, Some(&offers), &advance)
+    })?;
+    drop(surfaces);
     let found = some(&searched);
     let verdicts = each_view(vec![(); views], |view, ()| {
         let progress = steps.all()[step].progress(Phase::Check, view, views);
@@ -110,29 +119,45 @@ fn each_view<T: Send, R: Send>(views: Vec<T>, each: impl Fn(usize, T) -> Result<
     Ok(done.into_iter().map(|(_, result)| result).collect())
 }
 
+/// What the states show of all views, empty before there are any, and the states without it.
+fn shown(states: Vec<State>, views: usize) -> (Vec<Vec<ShownPlane>>, Vec<Option<State>>) {
+    let mut states: Vec<Option<State>> = states.into_iter().map(Some).collect();
+    states.resize_with(views, || None);
+    let show = |state: &mut Option<State>| {
+        state.as_mut().map(|state| std::mem::take(&mut state.solved.surface)).unwrap_or_default()
+    };
+    (states.iter_mut().map(show).collect(), states)
+}
+
 /// The states of all views as the steps take them.
 fn some(states: &[State]) -> Vec<Option<&State>> {
     states.iter().map(Some).collect()
 }
 
 /// Settles what became of every pixel.
-fn finish(steps: &Steps, states: &[State], tracker: &Tracker) -> Result<Vec<ViewResult>> {
+fn finish(steps: &Steps, states: Vec<State>, tracker: &Tracker) -> Result<Vec<ViewResult>> {
     let views = steps.views();
     let last = steps.all().last().expect("options have a scale");
-    let states = some(states);
-    each_view(vec![(); views], |view, ()| {
-        let progress = last.progress(Phase::Check, view, views);
-        steps.finish_with(view, &states, &|units| tracker.advance(units, progress))
+    let advance = |view, units| tracker.advance(units, last.progress(Phase::Check, view, views));
+    let known = some(&states);
+    let closings =
+        each_view(vec![(); views], |view, ()| steps.closings(view, &known, &|units| advance(view, units)))?;
+    // What closes the gaps is all that a view takes from other views' own states.
+    let (surfaces, mut owns) = shown(states, views);
+    owns.iter_mut().flatten().for_each(|own| own.solved.cost = Vec::new());
+    let given = owns.into_iter().flatten().zip(closings).collect();
+    each_view(given, |view, (own, closings): (State, Vec<_>)| {
+        steps.settle(&own, &|view| &surfaces[view], &closings, &|units| advance(view, units))
     })
 }
 
 fn fuse(scene: &Scene, options: &Options, results: &[ViewResult], hook: Hook) -> Result<PointCloud> {
-    let maps: Vec<Maps> = results.par_iter().map(ViewResult::filtered).collect();
     let overlaps = fusion::overlaps(results.len(), scene.points());
-    let views: Vec<FusionView> = (scene.views().iter().zip(&maps).zip(&overlaps))
-        .map(|((view, maps), overlap)| FusionView {
+    let views: Vec<FusionView> = (scene.views().iter().zip(results).zip(&overlaps))
+        .map(|((view, result), overlap)| FusionView {
             camera: &view.camera,
-            maps,
+            maps: &result.estimate,
+            outcome: Some(&result.outcome),
             picture: Some(&view.picture),
             overlap,
         })

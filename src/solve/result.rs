@@ -2,9 +2,9 @@
 //! closed, and what became of every pixel.
 
 use super::prepare::Steps;
-use super::search::missing;
+use super::search::{missing, surface_of};
 use super::state::{State, maps_of};
-use crate::ambc::{Search, assess};
+use crate::ambc::assess;
 use crate::averaging::average;
 use crate::closing;
 use crate::consistency::{self, ConsistencyRules};
@@ -14,7 +14,7 @@ use crate::maps::ViewResult;
 use crate::outcome::outcomes;
 use crate::progress::{Hook, Phase, Tracker};
 use crate::state::{Solution, ViewState};
-use crate::views::{ViewRules, ViewSets, select_sets};
+use crate::views::{Reference, ShownPlane, ViewRules, ViewSets, select_sets};
 
 impl Steps {
     /// Averages planes between views, closes small gaps and settles view set, cost and outcome of every pixel of a view after the last step.
@@ -27,17 +27,6 @@ impl Steps {
         self.check_place(step, view)?;
         let at = self.all()[step].progress(Phase::Check, view, self.views());
         let tracker = Tracker::new(hook, u64::from(self.scaled(step, view).camera.height));
-        self.finish_with(view, states, &|units| tracker.advance(units, at))
-    }
-
-    /// [`Steps::finish`] that asks `advance` whether to go on.
-    pub(super) fn finish_with(
-        &self,
-        view: usize,
-        states: &[Option<&State>],
-        advance: &(dyn Fn(u64) -> bool + Sync),
-    ) -> Result<ViewResult> {
-        let step = self.all().len() - 1;
         self.check_states(step, view, states)?;
         for (place, state) in states.iter().enumerate() {
             state.map_or(Ok(()), |state| state.require_marked(&format!("states[{place}]"), true))?;
@@ -45,18 +34,67 @@ impl Steps {
         let Some(own) = states.get(view).copied().flatten() else {
             return Err(missing(view));
         };
-        let reference = self.reference(step, view, states);
+        let advance = |units| tracker.advance(units, at);
+        let closings = self.closings(view, states, &advance)?;
+        self.settle(own, &|view| surface_of(states, view), &closings, &advance)
+    }
+
+    /// The validated planes of a view, averaged with those that its sources show.
+    fn averaged(&self, own: &State, reference: &Reference) -> Vec<Solution> {
+        let mut solutions = own.solved.solutions.clone();
+        if self.options.average_views {
+            average(reference, &mut solutions);
+        }
+        solutions
+    }
+
+    /// The pixels of small gaps with what the surfaces around them go on to, where the sources agree.
+    pub(super) fn closings(
+        &self,
+        view: usize,
+        states: &[Option<&State>],
+        advance: &(dyn Fn(u64) -> bool + Sync),
+    ) -> Result<Vec<(u32, Solution)>> {
+        let (step, Some(own)) = (self.all().len() - 1, states[view]) else { return Ok(Vec::new()) };
+        if !self.options.close_gaps {
+            return Ok(Vec::new());
+        }
+        let reference = self.reference(step, view, &|view| surface_of(states, view));
+        let ScaledView { camera, image, range, .. } = self.scaled(step, view);
+        let offers = closing::offers(camera, image, *range, &self.averaged(own, &reference));
+        let mut sets = ViewSets::empty(offers.len(), reference.sources.len());
+        let made = offers.iter().enumerate().filter(|(_, offer)| offer.depth > 0.0);
+        let made: Vec<_> = made.map(|(pixel, offer)| (pixel, offer.depth, offer.normal)).collect();
+        select_sets(&reference, ViewRules::new(&self.options, 0), &mut sets, &made);
+        let offered = ViewState { solutions: offers, sets, ..ViewState::default() };
+        let sources = self.found_by_sources(view, states);
+        // What is offered has no cost of its own that speaks for it: the sources must agree more closely.
+        let rules = ConsistencyRules::new(&self.options).closer();
+        let verdicts = consistency::check(&reference, &offered, &sources, &rules, &|| advance(0))?;
+        let closed =
+            (0u32..).zip(offered.solutions.iter().zip(verdicts)).filter(|(_, (_, verdict))| verdict.1);
+        let closed = closed.map(|(pixel, (&offer, (consistent, validated)))| {
+            (pixel, Solution { consistent, validated, ..offer })
+        });
+        Ok(closed.collect())
+    }
+
+    /// [`Steps::finish`] from a view's own state, the surfaces that the views show, and what closes its gaps.
+    pub(super) fn settle<'b>(
+        &'b self,
+        own: &State,
+        surfaces: &dyn Fn(usize) -> &'b [ShownPlane],
+        closings: &[(u32, Solution)],
+        advance: &(dyn Fn(u64) -> bool + Sync),
+    ) -> Result<ViewResult> {
+        let (step, view) = (self.all().len() - 1, own.view());
+        let reference = self.reference(step, view, surfaces);
         let cancelled = || advance(0);
         let mut search = self.plain_search(step, &reference, true, &cancelled);
         // A set that falls back to the start set would hide that nothing sees the solution.
         search.view_rules = ViewRules::new(&self.options, 0);
-        let mut solutions = own.solved.solutions.clone();
-        if self.options.average_views {
-            average(&reference, &mut solutions);
-        }
-        if self.options.close_gaps {
-            self.close_gaps(view, states, (&search, &mut solutions))?;
-        }
+        let mut solutions = self.averaged(own, &reference);
+        closings.iter().for_each(|&(pixel, closed)| solutions[pixel as usize] = closed);
         let assessment = assess(&search, &solutions)?;
         let mut counts = own.counts();
         counts += assessment.counts;
@@ -77,32 +115,5 @@ impl Steps {
             counts,
             cycles: own.cycles().to_vec(),
         })
-    }
-
-    /// Gives pixels without a validated solution what the surfaces around them go on to, where the sources agree.
-    fn close_gaps(
-        &self,
-        view: usize,
-        states: &[Option<&State>],
-        (search, solutions): (&Search, &mut [Solution]),
-    ) -> Result<()> {
-        let reference = search.reference;
-        let ScaledView { camera, image, range, .. } = self.scaled(self.all().len() - 1, view);
-        let offers = closing::offers(camera, image, *range, solutions);
-        let mut sets = ViewSets::empty(offers.len(), reference.sources.len());
-        let made = offers.iter().enumerate().filter(|(_, offer)| offer.depth > 0.0);
-        let made = made.map(|(pixel, offer)| (pixel, offer.depth, offer.normal));
-        select_sets(reference, search.view_rules, &mut sets, &made.collect::<Vec<_>>());
-        let offered = ViewState { solutions: offers, sets, ..ViewState::default() };
-        let sources = self.found_by_sources(view, states);
-        // What is offered has no cost of its own that speaks for it: the sources must agree more closely.
-        let rules = ConsistencyRules::new(&self.options).closer();
-        let verdicts = consistency::check(reference, &offered, &sources, &rules, search.cancelled)?;
-        for (pixel, (consistent, validated)) in verdicts.into_iter().enumerate() {
-            if validated {
-                solutions[pixel] = Solution { consistent, validated, ..offered.solutions[pixel] };
-            }
-        }
-        Ok(())
     }
 }

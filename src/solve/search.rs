@@ -14,7 +14,7 @@ use crate::progress::{Cancelled, Hook, Phase, Tracker};
 use crate::propagation::{self, Giver};
 use crate::smoothing::smooth;
 use crate::state::{Solution, ViewState};
-use crate::views::{Reference, Source, ViewRules, ViewSets, select_sets};
+use crate::views::{Reference, ShownPlane, Source, ViewRules, ViewSets, select_sets};
 use rayon::prelude::*;
 
 /// The planes other views offer to the pixels of a view; nothing on a scale's first cycle or with propagation off.
@@ -22,8 +22,19 @@ use rayon::prelude::*;
 pub struct Offers {
     step: usize,
     view: usize,
-    /// One a pixel, or none at all.
-    planes: Vec<Offer>,
+    /// Pixels of the view.
+    pixels: usize,
+    /// The pixels with an offer, a small part of all.
+    planes: Vec<(u32, Offer)>,
+}
+
+impl Offers {
+    /// One offer a pixel; `None` where there are none at all.
+    fn by_pixel(&self) -> Option<Vec<Offer>> {
+        let mut all = vec![Offer::default(); if self.planes.is_empty() { 0 } else { self.pixels }];
+        self.planes.iter().for_each(|&(pixel, offer)| all[pixel as usize] = offer);
+        (!all.is_empty()).then_some(all)
+    }
 }
 
 /// What a check says of every pixel of a view.
@@ -51,7 +62,12 @@ impl Steps {
         let target = states.get(view).copied().flatten();
         let (Some(target), true, true) = (target, self.options.propagation, self.all()[step].cycle > 0)
         else {
-            return Ok(Offers { step, view, planes: Vec::new() });
+            return Ok(Offers {
+                step,
+                view,
+                pixels: self.scaled(step, view).camera.pixels(),
+                planes: Vec::new(),
+            });
         };
         let mut givers = Vec::new();
         for (giver, state) in states.iter().enumerate() {
@@ -63,8 +79,9 @@ impl Steps {
             }
         }
         let ScaledView { camera, range, .. } = self.scaled(step, view);
-        let planes = propagation::offers(camera, &target.solved, *range, &givers, cancelled)?;
-        Ok(Offers { step, view, planes })
+        let offers = propagation::offers(camera, &target.solved, *range, &givers, cancelled)?;
+        let planes = (0u32..).zip(offers).filter(|(_, offer)| offer.depth > 0.0).collect();
+        Ok(Offers { step, view, pixels: camera.pixels(), planes })
     }
 
     /// Searches a view in a step, starting from its own state, helped by what is validated in its sources and by
@@ -85,34 +102,38 @@ impl Steps {
         let at = self.all()[step].progress(Phase::Search, view, self.views());
         let tracker =
             Tracker::new(hook, self.all()[step].work_on(self.scaled(step, view).camera.pixels() as u64));
-        self.search_with(step, view, states, offers, &|units| tracker.advance(units, at))
-    }
-
-    /// [`Steps::search`] that hands finished units of work to `advance`, which answers `true` to cancel.
-    pub(super) fn search_with(
-        &self,
-        step: usize,
-        view: usize,
-        states: &[Option<&State>],
-        offers: Option<&Offers>,
-        advance: &(dyn Fn(u64) -> bool + Sync),
-    ) -> Result<State> {
         self.check_states(step, view, states)?;
         for (place, state) in states.iter().enumerate() {
             state.map_or(Ok(()), |state| state.require_marked(&format!("states[{place}]"), true))?;
         }
-        let own = states.get(view).copied().flatten();
-        let schedule = self.all()[step];
-        let ScaledView { camera, mask, .. } = self.scaled(step, view);
         if let Some(offers) = offers
-            && (offers.step, offers.view, offers.planes.len().max(camera.pixels()))
-                != (step, view, camera.pixels())
+            && (offers.step, offers.view, offers.pixels)
+                != (step, view, self.scaled(step, view).camera.pixels())
         {
             let value = format!("offers to view {} for step {}", offers.view, offers.step);
             let expected = format!("those to view {view} for step {step}, of the same steps");
             return Err(Error::argument("offers", value, expected));
         }
-        let offers = offers.map(|offers| &offers.planes[..]).filter(|planes| !planes.is_empty());
+        let own = states.get(view).copied().flatten();
+        let shown = Shown {
+            surfaces: &|view| surface_of(states, view),
+            is_guided: states.iter().any(Option::is_some),
+        };
+        self.search_from((step, view), own, shown, offers, &|units| tracker.advance(units, at))
+    }
+
+    /// [`Steps::search`] from a view's own state and what the other views show of theirs; hands finished units of work to
+    /// `advance`, which answers `true` to cancel.
+    pub(super) fn search_from<'b>(
+        &'b self,
+        (step, view): (usize, usize),
+        own: Option<&State>,
+        shown: Shown<'b>,
+        offers: Option<&Offers>,
+        advance: &(dyn Fn(u64) -> bool + Sync),
+    ) -> Result<State> {
+        let schedule = self.all()[step];
+        let ScaledView { camera, mask, .. } = self.scaled(step, view);
         let mut state = State {
             view,
             step,
@@ -127,8 +148,8 @@ impl Steps {
             state.solved = ViewState { solutions, cost, sets, ..ViewState::default() };
         } else {
             let start = own.map(|own| &own.solved.solutions[..]);
-            let is_guided = states.iter().any(Option::is_some);
-            let reference = self.reference(step, view, states);
+            let offers = offers.and_then(Offers::by_pixel);
+            let reference = self.reference(step, view, shown.surfaces);
             // A band of one colour has half of its pixels.
             let band = camera.width as usize * band_rows(camera.height as usize);
             let cancelled = || advance(band as u64 * u64::from(schedule.scale.foods) / 2);
@@ -136,12 +157,12 @@ impl Steps {
             let search = Search {
                 mask: mask.as_deref(),
                 start,
-                offers,
+                offers: offers.as_deref(),
                 foods: schedule.scale.foods as usize,
                 iterations: schedule.iterations(),
                 around_start: self.around_start(schedule.cycle),
                 stream: stream(&[self.options.seed, view as u64, schedule.scale_index as u64, cycle]),
-                ..self.plain_search(step, &reference, is_guided, &cancelled)
+                ..self.plain_search(step, &reference, shown.is_guided, &cancelled)
             };
             let mut found = search.run()?;
             let filled = fill(&reference, &mut found.best, &found.weak);
@@ -198,7 +219,7 @@ impl Steps {
             return Err(missing(view));
         };
         own.require_marked(&format!("states[{view}]"), false)?;
-        let reference = self.reference(step, view, states);
+        let reference = self.reference(step, view, &|view| surface_of(states, view));
         let sources = self.found_by_sources(view, states);
         let rules = ConsistencyRules::new(&self.options);
         Ok(Verdicts(consistency::check(&reference, &own.solved, &sources, &rules, cancelled)?))
@@ -307,19 +328,31 @@ impl Steps {
         &'b self,
         step: usize,
         view: usize,
-        states: &[Option<&'b State>],
+        surfaces: &dyn Fn(usize) -> &'b [ShownPlane],
     ) -> Reference<'b> {
         let ScaledView { camera, image, range, .. } = self.scaled(step, view);
         let mut reference = Reference::new(camera, image, *range);
         for &source in self.sources(view) {
             let source = source as usize;
             let ScaledView { camera: other, image, .. } = self.scaled(step, source);
-            let surface =
-                states.get(source).copied().flatten().map_or(&[][..], |state| &state.solved.surface);
-            reference.sources.push(Source::new(camera, other, image, surface));
+            reference.sources.push(Source::new(camera, other, image, surfaces(source)));
         }
         reference
     }
+}
+
+/// What the views show of their states to a search.
+#[derive(Clone, Copy)]
+pub(super) struct Shown<'b> {
+    /// The validated surface of a view, empty where nothing is known.
+    pub surfaces: &'b (dyn Fn(usize) -> &'b [ShownPlane] + Sync),
+    /// Whether anything is known of any view.
+    pub is_guided: bool,
+}
+
+/// What a view's state shows of it.
+pub(super) fn surface_of<'b>(states: &[Option<&'b State>], view: usize) -> &'b [ShownPlane] {
+    states.get(view).copied().flatten().map_or(&[], |state| &state.solved.surface)
 }
 
 /// The error of a step that needs the view's own state.
