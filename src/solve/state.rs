@@ -6,7 +6,6 @@ use crate::maps::{Counts, CycleRecord, Maps};
 use crate::state::{Solution, ViewState};
 use crate::views::ViewSets;
 use glam::Vec3;
-use rayon::prelude::*;
 
 /// What is known of one view after it was searched in a step or, once it is marked, after the check of that step.
 #[derive(Debug, Clone)]
@@ -173,10 +172,10 @@ pub(super) fn is_unit(normal: Vec3) -> bool {
     (normal.length() - 1.0).abs() < 1e-2
 }
 
-/// Depth and normal of every solution.
+/// Depth and normal of every solution; on one thread, as hosts ask for them outside any pool.
 pub(super) fn maps_of(solutions: &[Solution]) -> Maps {
     Maps {
-        depth: solutions.par_iter().map(|solution| solution.depth).collect(),
-        normal: solutions.par_iter().map(|solution| solution.normal.to_array()).collect(),
+        depth: solutions.iter().map(|solution| solution.depth).collect(),
+        normal: solutions.iter().map(|solution| solution.normal.to_array()).collect(),
     }
 }
