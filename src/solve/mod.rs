@@ -105,7 +105,7 @@ fn cycle(steps: &Steps, step: usize, states: Vec<State>, tracker: &Tracker) -> R
 /// Does the same to all views, some at a time. The threads share the work on one view, and while there is not enough of
 /// it for all of them they work on another one; more views at a time would take more memory.
 fn each_view<T: Send, R: Send>(views: Vec<T>, each: impl Fn(usize, T) -> Result<R> + Sync) -> Result<Vec<R>> {
-    let at_a_time = 1 + rayon::current_num_threads().div_ceil(THREADS_PER_VIEW);
+    let at_a_time = 1 + (rayon::current_num_threads() + THREADS_PER_VIEW / 2) / THREADS_PER_VIEW;
     let mut turns: Vec<Vec<(usize, T)>> = (0..at_a_time).map(|_| Vec::new()).collect();
     for (view, input) in views.into_iter().enumerate() {
         turns[view % at_a_time].push((view, input));
