@@ -568,8 +568,8 @@ size_t skep_last_error(char *buffer,
                        size_t capacity);
 
 /**
- * Makes options from a preset: "default" (or NULL), which measures best, "fast", which takes a good third of its
- * time, or "paper", which follows the paper to the letter.
+ * Makes options from a preset: "default" (or NULL), which measures best, "fast", which takes less than half of
+ * its time, or "paper", which follows the paper to the letter.
  */
 skep_status skep_options_create(const char *preset_or_null,
                                 struct skep_options **options_out);

@@ -6,7 +6,7 @@ use common::procedural::{self, Procedural, Shape, Surface, Texture, pixel_centre
 use glam::{DVec2, DVec3};
 use skep::camera::Camera;
 use skep::fusion::{FusionView, fuse};
-use skep::{Error, FusionOptions, Maps, Phase, PointCloud, Progress, ignore_progress};
+use skep::{Error, FusionOptions, Maps, Outcome, Phase, PointCloud, Progress, ignore_progress};
 use std::ops::ControlFlow;
 use std::sync::Mutex;
 
@@ -336,6 +336,29 @@ fn the_hook_follows_the_fusion_and_can_stop_it() {
 }
 
 #[test]
+fn only_what_is_validated_counts_where_outcomes_are_given() {
+    let made = procedural::textureless_panel();
+    let overlap = all_others(made.truth.len());
+    let left_out = |pixel: usize| pixel.is_multiple_of(3);
+    let outcomes: Vec<Outcome> = (0..made.truth[0].depth.len())
+        .map(|pixel| if left_out(pixel) { Outcome::Inconsistent } else { Outcome::Validated })
+        .collect();
+    let mut with_outcomes = fusion_views(&made, &made.truth, &overlap);
+    with_outcomes.iter_mut().for_each(|view| view.outcome = Some(&outcomes));
+    let mut without = made.truth.to_vec();
+    for maps in &mut without {
+        maps.depth
+            .iter_mut()
+            .enumerate()
+            .filter(|(pixel, _)| left_out(*pixel))
+            .for_each(|(_, depth)| *depth = 0.0);
+    }
+    let cloud = fuse(&with_outcomes, &OPTIONS, &ignore_progress).unwrap();
+    assert!(!cloud.positions.is_empty());
+    assert!(cloud == fuse_maps(&made, &without, OPTIONS));
+}
+
+#[test]
 fn bad_input_is_named() {
     let made = procedural::textureless_panel();
     let overlap = all_others(2);
@@ -346,6 +369,8 @@ fn bad_input_is_named() {
     let short = Maps { depth: vec![1.0; 5], normal: made.truth[0].normal.clone() };
     let text = refused(FusionView { maps: &short, ..views[0] }, OPTIONS);
     assert!(text.contains("views[0].maps.depth is 5 values") && text.contains("12288"), "{text}");
+    let text = refused(FusionView { outcome: Some(&[Outcome::Validated; 5]), ..views[0] }, OPTIONS);
+    assert!(text.contains("views[0].outcome is 5 values") && text.contains("12288"), "{text}");
     let small = skep::image::Picture::from_grey(2, 1, vec![0; 2]).unwrap();
     let text = refused(FusionView { picture: Some(&small), ..views[0] }, OPTIONS);
     assert!(text.contains("views[0].picture is 2x1") && text.contains("128x96"), "{text}");

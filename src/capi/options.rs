@@ -28,8 +28,8 @@ pub struct skep_scale {
     pub cycle_iterations: u32,
 }
 
-/// Makes options from a preset: "default" (or NULL), which measures best, "fast", which takes a good third of its
-/// time, or "paper", which follows the paper to the letter.
+/// Makes options from a preset: "default" (or NULL), which measures best, "fast", which takes less than half of
+/// its time, or "paper", which follows the paper to the letter.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_options_create(
     preset_or_null: *const c_char,

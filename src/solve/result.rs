@@ -17,7 +17,8 @@ use crate::state::{Solution, ViewState};
 use crate::views::{Reference, ShownPlane, ViewRules, ViewSets, select_sets};
 
 impl Steps {
-    /// Averages planes between views, closes small gaps and settles view set, cost and outcome of every pixel of a view after the last step.
+    /// Averages planes between views, closes small gaps and settles view set, cost and outcome of every pixel of a view
+    /// after the last step.
     ///
     /// # Errors
     /// A view there is not; states that are not of full size, of another scene or view than they stand for, or not
@@ -93,6 +94,7 @@ impl Steps {
         let mut search = self.plain_search(step, &reference, true, &cancelled);
         // A set that falls back to the start set would hide that nothing sees the solution.
         search.view_rules = ViewRules::new(&self.options, 0);
+        // Averaged once more: kept since the gaps were closed, those of all views would take half as much memory again.
         let mut solutions = self.averaged(own, &reference);
         closings.iter().for_each(|&(pixel, closed)| solutions[pixel as usize] = closed);
         let assessment = assess(&search, &solutions)?;

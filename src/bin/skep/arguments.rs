@@ -30,7 +30,7 @@ pub struct Reconstruct {
     /// Where the results go [default: SCENE/dense]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// default measures best; fast takes a good third of its time; paper follows the paper to the letter and
+    /// default measures best; fast takes less than half of its time; paper follows the paper to the letter and
     /// takes its own
     #[arg(long, default_value = "default", value_parser = Options::PRESETS)]
     pub preset: String,

@@ -25,6 +25,7 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
     display.say(&format!("reading {}", arguments.scene.display()));
     let scene = read_scene(&arguments.scene, depth_range)?;
     require_writable(&output)?;
+    let writers = pool(options.threads)?;
 
     let interrupt = Interrupt::watch();
     let result = solve(&scene, &options, display, &stopwatch, &interrupt)
@@ -35,7 +36,7 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
     stopwatch.enter(Stage::Writing);
     display.say(&format!("writing {}", output.display()));
     let mut report = Report::new(&scene, &arguments.preset, &options, &result);
-    write(&output, &arguments.scene, &scene, &result, options.threads, &interrupt)?;
+    writers.install(|| write(&output, &arguments.scene, &scene, &result, &interrupt))?;
     report.set_times(stopwatch.times());
     report.write(&report_path(&output))?;
 
@@ -68,13 +69,12 @@ fn require_writable(folder: &Path) -> Result<()> {
     attempt.map(drop).map_err(|error| Error::file(folder, format!("cannot be written to: {error}")))
 }
 
-/// Writes every file, the report excepted; stops between two files when interrupted.
+/// Writes every file, the report excepted, on the threads of the current pool; stops between two views when interrupted.
 fn write(
     output: &Path,
     folder: &Path,
     scene: &Scene,
     result: &Reconstruction,
-    threads: usize,
     interrupt: &Interrupt,
 ) -> Result<()> {
     // A report says that everything beside it is there and belongs together: an older one must not say so meanwhile.
@@ -88,13 +88,11 @@ fn write(
     let workspace = Workspace::new(output);
     let written = AtomicUsize::new(0);
     let views = scene.views().par_iter().zip(&result.views).with_max_len(1);
-    let all = pool(threads)?.install(|| {
-        views.try_for_each(|(view, result)| {
-            interrupt.check()?;
-            workspace.write_view(&view.name, &view.camera, result)?;
-            written.fetch_add(1, Ordering::Relaxed);
-            Ok(())
-        })
+    let all = views.try_for_each(|(view, result)| {
+        interrupt.check()?;
+        workspace.write_view(&view.name, &view.camera, result)?;
+        written.fetch_add(1, Ordering::Relaxed);
+        Ok(())
     });
     all.inspect_err(|error| {
         let written = written.load(Ordering::Relaxed);
@@ -108,7 +106,8 @@ fn write(
     Workspace::write_cloud(&workspace.cloud(), &result.points)
 }
 
-/// Threads for what the library has no part in; 0 takes one for each core.
+/// Threads for what the library has no part in; 0 takes one for each core. Started before hours of work, which must not
+/// be lost because there are none.
 fn pool(threads: usize) -> Result<rayon::ThreadPool> {
     let expected = "a number of threads that the system can start";
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();

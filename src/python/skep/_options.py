@@ -39,7 +39,7 @@ _ATTRIBUTES = {name.replace(".", "_"): name for name in _NAMES}
 class Options(Mapping[str, float]):
     """Options by name, as items or attributes: `options["fusion.min_views"]` is `options.fusion_min_views`.
 
-    Starts from a preset: "default", which measures best, "fast", which takes a good third of its time, or "paper",
+    Starts from a preset: "default", which measures best, "fast", which takes less than half of its time, or "paper",
     which follows the paper to the letter. `Options(threads=2, fusion_min_views=2)` sets some at once. Numbers are checked when they are set.
     """
 
