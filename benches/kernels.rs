@@ -159,44 +159,45 @@ impl Task for Homographies<'_> {
 }
 
 /// Nothing but the bytes that [`Compare`] reads, from addresses worked out before: the machine's limit.
-struct Gather<'a>(&'a PackedImage, &'a [[[f32; LANES]; 2]]);
+struct Gather<'a>(&'a PackedImage, &'a [[u32; LANES]]);
 
 impl Task for Gather<'_> {
-    type Output = [f32; LANES];
+    type Output = [u32; LANES];
 
-    fn run<S: Simd>(self, simd: S) -> [f32; LANES] {
+    fn run<S: Simd>(self, simd: S) -> [u32; LANES] {
         let Gather(image, places) = self;
         simd.vectorize(
             #[inline(always)]
             || {
-                let mut sums = [simd.splat(0.0); 4];
-                for [x, y] in places {
-                    let taps = simd.gather_bytes(&image.pairs, image.stride(), simd.load(x), simd.load(y));
-                    sums = std::array::from_fn(|tap| simd.add(sums[tap], taps[tap]));
+                let mut sums = [0u32; LANES];
+                for places in places {
+                    let taps = simd.gather(&image.taps, places);
+                    for (sum, tap) in sums.iter_mut().zip(taps) {
+                        *sum = sum.wrapping_add(tap);
+                    }
                 }
-                let [a, b, c, d] = sums;
-                simd.store(simd.add(simd.add(a, b), simd.add(c, d)))
+                sums
             },
         )
     }
 }
 
 /// Where the 36 samples of every patch fall in the first source view, eight a vector, the last one filled up.
-fn places(patches: &Patches) -> Vec<[[f32; LANES]; 2]> {
+fn places(patches: &Patches) -> Vec<[u32; LANES]> {
     let Source { image, homographies, .. } = &patches.sources[0];
     let offsets: Vec<(f32, f32)> =
         (-5..=5).step_by(2).flat_map(|y| (-5..=5).step_by(2).map(move |x| (x as f32, y as f32))).collect();
     let mut places = Vec::new();
     for PatchHomography { centre, along_x, along_y } in homographies {
         for eight in offsets.chunks(LANES) {
-            let place = |lane: usize| {
+            places.push(std::array::from_fn(|lane| {
                 let (dx, dy) = eight[lane.min(eight.len() - 1)];
                 let point = *centre + dx * *along_x + dy * *along_y;
-                let inside = |at: f32, size: usize| at.clamp(0.0, (size - 1) as f32).floor();
-                (inside(point.x / point.z, image.width), inside(point.y / point.z, image.height))
-            };
-            places
-                .push([std::array::from_fn(|lane| place(lane).0), std::array::from_fn(|lane| place(lane).1)]);
+                let inside = |at: f32, size: usize| at.clamp(0.0, (size - 1) as f32) as usize;
+                let (x, y) =
+                    (inside(point.x / point.z, image.width), inside(point.y / point.z, image.height));
+                (y * image.taps.stride() + x) as u32
+            }));
         }
     }
     places

@@ -1214,7 +1214,8 @@ void skep_window_destroy(struct skep_window *window);
  * Normalised cross-correlations of patches of the reference with their images in a source view: `pixels` holds x, y of
  * each patch's centre in the reference (2 * count), `homographies` the way of each from reference to source pixels (9
  * doubles each, row by row), `ncc` has room for count floats. -1 to 1; -1 also where either side has no texture. Samples
- * outside the reference weigh nothing, those outside the source repeat its border.
+ * outside the reference weigh nothing, those outside the source repeat its border. The source is interpolated bilinearly
+ * at places in 256ths of a pixel, so an NCC differs from the exact one by some 1e-4.
  *
  * Patches that follow each other at the same pixel share the reference's side: sort them so. Stateless: any number of
  * threads, no allocation.

@@ -29,10 +29,11 @@ proptest! {
         prop_assert_eq!((packed.width, packed.height), (picture.width() as usize, picture.height() as usize));
         for y in 0..picture.height() {
             for x in 0..picture.width() {
-                let at = y as usize * packed.stride() + x as usize;
-                let pairs = [packed.pairs[at], packed.pairs[at + 1]].map(u16::to_le_bytes);
+                let at = y as usize * packed.taps.stride() + x as usize;
+                let pairs = [packed.taps.pairs()[at], packed.taps.pairs()[at + 1]].concat();
+                let pairs: Vec<u8> = pairs.into_iter().map(|tap| (i16::from(tap) + 128) as u8).collect();
                 let taps = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(dx, dy)| grey(&picture, x + dx, y + dy));
-                prop_assert_eq!(pairs.concat(), taps);
+                prop_assert_eq!(pairs, taps);
                 prop_assert_eq!(packed.grey(x as usize, y as usize), taps[0]);
             }
         }

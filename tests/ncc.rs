@@ -93,6 +93,7 @@ fn grey_at(picture: &Picture, x: usize, y: usize) -> f64 {
     f64::from(picture.grey()[y * picture.width() as usize + x])
 }
 
+/// At a place whose fractions are those of [`in_parts`].
 fn bilinear(picture: &Picture, x: f64, y: f64) -> f64 {
     let (column, row) = (x as usize, y as usize);
     let (right, below) =
@@ -103,6 +104,11 @@ fn bilinear(picture: &Picture, x: f64, y: f64) -> f64 {
     top * (1.0 - fy) + low * fy
 }
 
+/// The place between two pixels that samples are taken at: of 256 parts, the first is one pixel and the last the other.
+fn in_parts(at: f64) -> f64 {
+    at.floor() + (at.fract() * 256.0).floor() / 255.0
+}
+
 /// A coordinate brought into the image, and how far f32 may be off there: some ulp of what it is summed from, divided by
 /// the third coordinate; nothing where both ends of that interval lie beyond the same border.
 fn clamped(terms: [f64; 3], z_terms: [f64; 3], last: u32) -> (f64, f64) {
@@ -110,7 +116,7 @@ fn clamped(terms: [f64; 3], z_terms: [f64; 3], last: u32) -> (f64, f64) {
     let ulps = 6.0 * f64::from(f32::EPSILON);
     let (sum, z): (f64, f64) = (terms.iter().sum(), z_terms.iter().sum());
     let at = sum / z;
-    let inside = |at: f64| at.max(0.0).min(f64::from(last));
+    let inside = |at: f64| in_parts(at.max(0.0).min(f64::from(last)));
     if z.abs() <= ulps * magnitude(z_terms) {
         return (inside(at), f64::from(last));
     }

@@ -1,7 +1,7 @@
 //! Every back-end's operations against the scalar ones: the same bits.
 
 use proptest::prelude::*;
-use skep::simd::{LANES, Level, Scalar, Simd, Task, dispatch};
+use skep::simd::{LANES, Level, Scalar, Simd, Taps, Task, WEIGHTS, dispatch};
 
 type Lanes = [f32; LANES];
 
@@ -104,26 +104,20 @@ impl Operation for Places<'_> {
 }
 
 #[derive(Clone, Copy)]
-struct Gather<'a> {
-    pairs: &'a [u16],
-    stride: usize,
-    x: Lanes,
-    y: Lanes,
-}
+struct Bilinear<'a>(&'a Taps, Lanes, Lanes);
 
-impl Operation for Gather<'_> {
+impl Operation for Bilinear<'_> {
     fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
-        let taps = simd.gather_bytes(self.pairs, self.stride, simd.load(&self.x), simd.load(&self.y));
-        taps.map(|tap| simd.store(tap)).to_vec()
+        vec![simd.store(simd.bilinear(self.0, simd.load(&self.1), simd.load(&self.2)))]
     }
 }
 
 #[derive(Clone, Copy)]
-struct LookUp<'a>(&'a [f32; 256], Lanes);
+struct Gather<'a>(&'a Taps, &'a [u32; LANES]);
 
-impl Operation for LookUp<'_> {
+impl Operation for Gather<'_> {
     fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
-        vec![simd.store(simd.look_up(self.0, simd.load(&self.1)))]
+        vec![simd.gather(self.0, self.1).map(f32::from_bits)]
     }
 }
 
@@ -139,6 +133,16 @@ fn any_lanes() -> impl Strategy<Value = Lanes> {
 
 fn whole_lanes(below: u32) -> impl Strategy<Value = Lanes> {
     prop::array::uniform8((0..below).prop_map(|lane| lane as f32))
+}
+
+prop_compose! {
+    fn image()(width in 1..20usize, height in 1..20usize)(
+        grey in prop::collection::vec(any::<u8>(), width * height),
+        width in Just(width),
+        height in Just(height),
+    ) -> (Vec<u8>, usize, usize) {
+        (grey, width, height)
+    }
 }
 
 #[test]
@@ -187,28 +191,45 @@ proptest! {
     }
 
     #[test]
-    fn gathered_bytes_are_those_of_two_pairs_also_beyond_the_end(
-        pairs in prop::collection::vec(any::<u16>(), 2..60),
-        stride in 1..20usize,
-        x in whole_lanes(30),
-        y in whole_lanes(30),
+    fn samples_between_pixels_are_the_weighted_mean_of_four(
+        (grey, width, height) in image(),
+        x in prop::array::uniform8(prop_oneof![-600.0..5_000.0f32, any_lane()]),
+        y in prop::array::uniform8(prop_oneof![-600.0..5_000.0f32, any_lane()]),
     ) {
-        let gather = Gather { pairs: &pairs, stride, x, y };
-        check(gather)?;
-        let taps = gather.run(Scalar);
+        let taps = Taps::new(&grey, width, height);
+        check(Bilinear(&taps, x, y))?;
+        let samples = Bilinear(&taps, x, y).run(Scalar)[0];
         for lane in 0..LANES {
-            let index = (y[lane] as usize * stride + x[lane] as usize).min(pairs.len() - 2);
-            let [first, second] = [pairs[index], pairs[index + 1]].map(u16::to_le_bytes);
-            let expected = [first[0], first[1], second[0], second[1]].map(f32::from);
-            prop_assert_eq!([0, 1, 2, 3].map(|tap| taps[tap][lane]), expected);
+            // The pixel before the place, and how far it is from there: of 256 parts, the last is the next pixel.
+            let split = |at: f32, size: usize| {
+                let parts = f64::from(at).max(0.0).min((size - 1) as f64 * 256.0).floor();
+                ((parts / 256.0) as usize, parts % 256.0 / 255.0)
+            };
+            let ((column, along), (row, down)) = (split(x[lane], width), split(y[lane], height));
+            let at = |column: usize, row: usize| {
+                f64::from(grey[row.min(height - 1) * width + column.min(width - 1)])
+            };
+            let top = at(column, row) * (1.0 - along) + at(column + 1, row) * along;
+            let low = at(column, row + 1) * (1.0 - along) + at(column + 1, row + 1) * along;
+            let expected = top * (1.0 - down) + low * down;
+            let sample = f64::from(samples[lane] / WEIGHTS) + 128.0;
+            prop_assert!((sample - expected).abs() < 1e-4, "{} instead of {}", sample, expected);
         }
     }
 
     #[test]
-    fn tables_are_read_at_their_entries(lanes in whole_lanes(256)) {
-        let table = std::array::from_fn(|entry| 1.0 / (1.0 + entry as f32));
-        check(LookUp(&table, lanes))?;
-        prop_assert_eq!(LookUp(&table, lanes).run(Scalar), vec![lanes.map(|lane| 1.0 / (1.0 + lane))]);
+    fn gathered_taps_are_those_of_two_pairs_also_beyond_the_end(
+        (grey, width, height) in image(),
+        at in prop::array::uniform8(prop_oneof![0..400u32, any::<u32>()]),
+    ) {
+        let taps = Taps::new(&grey, width, height);
+        check(Gather(&taps, &at))?;
+        for (gathered, index) in Scalar.gather(&taps, &at).into_iter().zip(at) {
+            let index = (index as usize).min(taps.pairs().len() - 2);
+            let [first, second] = [taps.pairs()[index], taps.pairs()[index + 1]];
+            let expected = [first, second].concat();
+            prop_assert_eq!(gathered.to_le_bytes().map(|byte| byte as i8).to_vec(), expected);
+        }
     }
 }
 

@@ -18,7 +18,7 @@ static skep::Homography random_homography(cv::RNG &random, const skep::Pixel &pi
 }
 
 struct Differences {
-    double from_exact = 0, from_opencv = 0, mean_from_opencv = 0, largest_bound = 0;
+    double from_exact = 0, mean_from_exact = 0, from_opencv = 0, mean_from_opencv = 0, largest_bound = 0;
 };
 
 static Differences compare(const cv::Mat &reference, const cv::Mat &source, int step,
@@ -56,10 +56,15 @@ static Differences compare(const cv::Mat &reference, const cv::Mat &source, int 
         const double expected = own.dot(exact) / (cv::norm(own) * cv::norm(exact));
         // Unit vectors change by at most twice the relative change of what they are made from, and
         // so does their product with another; 1e-4 more is for the single precision of both sides.
-        const double bound = 2 * cv::norm(error) / cv::norm(exact) + 1e-4;
+        // The library's places are off by up to 1/256 px, a quarter of what OpenCV's are.
+        const double change = 2 * cv::norm(error) / cv::norm(exact);
+        const double own_bound = change / 4 + 1e-4, bound = change + own_bound;
+        const double from_exact = std::abs(double(ncc[i]) - expected);
+        CHECK(from_exact <= own_bound);
         const double difference = std::abs(double(ncc[i]) - result.at<float>(0, 0));
         CHECK(difference <= bound);
-        out.from_exact = std::max(out.from_exact, std::abs(double(ncc[i]) - expected));
+        out.from_exact = std::max(out.from_exact, from_exact);
+        out.mean_from_exact += from_exact / double(pixels.size());
         out.from_opencv = std::max(out.from_opencv, difference);
         out.mean_from_opencv += difference / double(pixels.size());
         out.largest_bound = std::max(out.largest_bound, bound);
@@ -82,12 +87,12 @@ int main() {
     }
     for (int step : {1, 2}) {
         const Differences found = compare(reference, source, step, pixels, homographies);
-        std::printf("ncc, step %d: at most %.1e from doubles; from OpenCV %.1e in the mean, %.1e "
-                    "at most, where "
+        std::printf("ncc, step %d: from doubles %.1e in the mean, %.1e at most; from OpenCV %.1e in "
+                    "the mean, %.1e at most, where "
                     "rounding places to 1/32 px allows up to %.1e\n",
-                    step, found.from_exact, found.mean_from_opencv, found.from_opencv,
-                    found.largest_bound);
-        CHECK(found.from_exact < 1e-4);
+                    step, found.mean_from_exact, found.from_exact, found.mean_from_opencv,
+                    found.from_opencv, found.largest_bound);
+        CHECK(found.mean_from_exact < 2e-4);
         CHECK(found.mean_from_opencv < 2e-3);
     }
 }

@@ -3,7 +3,9 @@
 use super::PatchHomography;
 use super::warp::Warp;
 use crate::image::PackedImage;
-use crate::simd::{LANES, Simd};
+use crate::simd::{LANES, Simd, WEIGHTS};
+use std::array::from_fn;
+use std::slice::from_ref;
 
 /// The cost of patches that cannot be compared, and the highest there is.
 pub const MAX_COST: f32 = 2.0;
@@ -13,7 +15,9 @@ pub const MAX_COST: f32 = 2.0;
 pub struct Window {
     /// Half its side, in pixels.
     radius: usize,
-    offsets: Vec<Offsets>,
+    /// Pairs of vectors that mirror each other at the pixel.
+    mirrored: Vec<[Offsets; 2]>,
+    rest: Vec<Offsets>,
     /// `exp(-d^2 / (2 sigma^2))` of a difference d of grey values.
     colour_weights: Box<[f32; 256]>,
     samples: u64,
@@ -31,6 +35,40 @@ struct Offsets {
     /// The same place from the window's top-left corner.
     column: [i32; LANES],
     row: [i32; LANES],
+}
+
+impl Offsets {
+    /// Up to eight samples of a window of this radius.
+    fn new(samples: &[(i32, i32)], radius: i32, spatial_sigma: f64) -> Offsets {
+        let lane = |get: &dyn Fn((i32, i32)) -> f32| {
+            from_fn(|lane| samples.get(lane).map_or(0.0, |&sample| get(sample)))
+        };
+        let weight =
+            |(x, y): (i32, i32)| (-f64::from(x * x + y * y) / (2.0 * spatial_sigma.powi(2))).exp() as f32;
+        let (x, y) = (lane(&|(x, _)| x as f32), lane(&|(_, y)| y as f32));
+        let from_corner = |offsets: [f32; LANES]| offsets.map(|offset| offset as i32 + radius);
+        Offsets { x, y, weight: lane(&weight), column: from_corner(x), row: from_corner(y) }
+    }
+
+    /// The samples about a pixel near the image's border and their spatial weights: 0 for those outside.
+    fn of_those_inside(
+        &self,
+        image: &PackedImage,
+        (x, y): (usize, usize),
+        radius: usize,
+    ) -> ([i8; LANES], [f32; LANES]) {
+        let (mut grey, mut weight) = ([0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            let (column, row) = (x + self.column[lane] as usize, y + self.row[lane] as usize);
+            if (radius..image.width + radius).contains(&column)
+                && (radius..image.height + radius).contains(&row)
+            {
+                grey[lane] = image.taps.pairs()[(row - radius) * image.taps.stride() + column - radius][0];
+                weight[lane] = self.weight[lane];
+            }
+        }
+        (grey, weight)
+    }
 }
 
 impl Window {
@@ -60,37 +98,37 @@ impl Window {
     ) -> Window {
         let radius = radius as i32;
         let positions = || (-radius..=radius).step_by(step as usize);
-        let samples: Vec<(f32, f32, f32)> = positions()
+        let samples: Vec<(i32, i32)> = positions()
             .flat_map(|y| positions().map(move |x| (x, y)))
             .filter(|&(x, y)| is_inside(x, y))
-            .map(|(x, y)| {
-                let distance = f64::from(x * x + y * y);
-                (x as f32, y as f32, (-distance / (2.0 * spatial_sigma.powi(2))).exp() as f32)
-            })
             .collect();
-        let offsets = samples
-            .chunks(LANES)
-            .map(|chunk| {
-                let lane = |get: fn(&(f32, f32, f32)) -> f32| {
-                    std::array::from_fn(|lane| chunk.get(lane).map_or(0.0, get))
-                };
-                let (x, y) = (lane(|s| s.0), lane(|s| s.1));
-                let from_corner = |offsets: [f32; LANES]| offsets.map(|offset| offset as i32 + radius);
-                let (column, row) = (from_corner(x), from_corner(y));
-                Offsets { x, y, weight: lane(|s| s.2), column, row }
-            })
-            .collect();
+        let half = |&&(x, y): &&(i32, i32)| (y, x) < (0, 0) && samples.contains(&(-x, -y));
+        let half: Vec<(i32, i32)> = samples.iter().filter(half).copied().collect();
+        let (eights, _) = half.as_chunks::<LANES>();
+        let both_sides = |eight: &[(i32, i32); LANES]| [*eight, eight.map(|(x, y)| (-x, -y))];
+        let eights: Vec<[[(i32, i32); LANES]; 2]> = eights.iter().map(both_sides).collect();
+        let is_mirrored =
+            |sample: &(i32, i32)| eights.iter().flatten().flatten().any(|other| other == sample);
+        let rest: Vec<(i32, i32)> = samples.iter().filter(|sample| !is_mirrored(sample)).copied().collect();
+        let offsets = |samples: &[(i32, i32)]| Offsets::new(samples, radius, spatial_sigma);
         let colour_weight = |difference: usize| {
             let difference = difference as f64 / 255.0;
             (-difference.powi(2) / (2.0 * colour_sigma.powi(2))).exp() as f32
         };
         Window {
             radius: radius as usize,
-            offsets,
-            colour_weights: Box::new(std::array::from_fn(colour_weight)),
+            mirrored: eights.iter().map(|pair| pair.map(|eight| offsets(&eight))).collect(),
+            rest: rest.chunks(LANES).map(offsets).collect(),
+            colour_weights: Box::new(from_fn(colour_weight)),
             samples: samples.len() as u64,
             min_variance: (min_variance * 255.0 * 255.0) as f32,
         }
+    }
+
+    /// All vectors, in the order of a patch's.
+    #[inline(always)]
+    fn offsets(&self) -> impl Iterator<Item = &Offsets> {
+        self.mirrored.as_flattened().iter().chain(&self.rest)
     }
 
     /// The bilateral weight of a difference of grey values.
@@ -116,7 +154,7 @@ pub struct ReferencePatch {
     weights: [[f32; LANES]; MAX_VECTORS],
     /// Weights times difference to the mean, divided by the standard deviation.
     weighted: [[f32; LANES]; MAX_VECTORS],
-    /// Weighted mean of the grey values.
+    /// Weighted mean of the grey values, less 128.
     mean: f32,
     /// Weighted variance of the grey values.
     variance: f32,
@@ -127,7 +165,7 @@ impl ReferencePatch {
     pub fn new(window: &Window) -> ReferencePatch {
         let zeros = [[0.0; LANES]; MAX_VECTORS];
         ReferencePatch {
-            vectors: window.offsets.len(),
+            vectors: window.offsets().count(),
             weights: zeros,
             weighted: zeros,
             mean: 0.0,
@@ -148,67 +186,33 @@ impl ReferencePatch {
     /// Samples the patch around a pixel. What lies outside the image weighs nothing.
     #[inline(always)]
     pub fn sample<S: Simd>(&mut self, simd: S, window: &Window, image: &PackedImage, x: usize, y: usize) {
-        let (width, height) = (image.width, image.height);
-        let (radius, centre) = (window.radius, image.grey(x, y));
-        if x >= radius && y >= radius && x + radius < width && y + radius < height {
-            return self.sample_inside(simd, window, image, (x, y), centre);
-        }
-        let centre = simd.splat(f32::from(centre));
-        let (x, y) = (simd.splat(x as f32), simd.splat(y as f32));
-        let (right, bottom) = (simd.splat((width - 1) as f32), simd.splat((height - 1) as f32));
-        let zero = simd.splat(0.0);
-        let (mut total, mut sum) = (zero, zero);
-        for (index, offsets) in window.offsets.iter().enumerate() {
-            let (sample_x, sample_y) =
-                (simd.add(x, simd.load(&offsets.x)), simd.add(y, simd.load(&offsets.y)));
-            let inside_x = simd.min(simd.max(sample_x, zero), right);
-            let inside_y = simd.min(simd.max(sample_y, zero), bottom);
-            let [grey, ..] = simd.gather_bytes(&image.pairs, image.stride(), inside_x, inside_y);
-            let difference = simd.max(simd.sub(grey, centre), simd.sub(centre, grey));
-            let weight =
-                simd.mul(simd.load(&offsets.weight), simd.look_up(&window.colour_weights, difference));
-            // 0 where clamping moved the sample by a pixel or more, 1 where it did not.
-            let moved_x = simd.max(simd.sub(inside_x, sample_x), simd.sub(sample_x, inside_x));
-            let moved_y = simd.max(simd.sub(inside_y, sample_y), simd.sub(sample_y, inside_y));
-            let moved = simd.min(simd.add(moved_x, moved_y), simd.splat(1.0));
-            let weight = simd.mul(weight, simd.sub(simd.splat(1.0), moved));
+        let (radius, stride) = (window.radius, image.taps.stride() as i32);
+        let is_inside = x >= radius && y >= radius && x + radius < image.width && y + radius < image.height;
+        let centre = image.taps.pairs()[y * image.taps.stride() + x][0];
+        let first = if is_inside {
+            &image.taps.pairs()[(y - radius) * image.taps.stride() + x - radius..]
+        } else {
+            &[]
+        };
+        let (mut total, mut sum) = (simd.splat(0.0), simd.splat(0.0));
+        for (index, offsets) in window.offsets().enumerate() {
+            let (grey, weight) = if is_inside {
+                let places: [i32; LANES] = from_fn(|lane| offsets.row[lane] * stride + offsets.column[lane]);
+                let grey: [i8; LANES] = from_fn(|lane| first[places[lane] as usize][0]);
+                (grey, offsets.weight)
+            } else {
+                offsets.of_those_inside(image, (x, y), radius)
+            };
+            let likeness: [f32; LANES] =
+                from_fn(|lane| window.colour_weights[usize::from(grey[lane].abs_diff(centre))]);
+            let grey = simd.load(&grey.map(f32::from));
+            let weight = simd.mul(simd.load(&weight), simd.load(&likeness));
             total = simd.add(total, weight);
             sum = simd.mul_add(weight, grey, sum);
             self.weights[index] = simd.store(weight);
             self.weighted[index] = simd.store(grey);
         }
         // The centre pixel's own neighbours weigh something unless the window is wider than the image.
-        let scale = 1.0 / simd.sum(total).max(f32::MIN_POSITIVE);
-        self.mean = simd.sum(sum) * scale;
-        self.normalise(simd, scale);
-    }
-
-    /// The same for a window that lies inside the image: nothing is clamped, so samples are bytes at known places.
-    #[inline(always)]
-    fn sample_inside<S: Simd>(
-        &mut self,
-        simd: S,
-        window: &Window,
-        image: &PackedImage,
-        (x, y): (usize, usize),
-        centre: u8,
-    ) {
-        let stride = image.stride() as i32;
-        let first = &image.pairs[(y - window.radius) * image.stride() + x - window.radius..];
-        let (mut total, mut sum) = (simd.splat(0.0), simd.splat(0.0));
-        for (index, offsets) in window.offsets.iter().enumerate() {
-            let places: [i32; LANES] =
-                std::array::from_fn(|lane| offsets.row[lane] * stride + offsets.column[lane]);
-            let grey: [u8; LANES] = std::array::from_fn(|lane| first[places[lane] as usize].to_le_bytes()[0]);
-            let likeness: [f32; LANES] =
-                std::array::from_fn(|lane| window.colour_weights[usize::from(grey[lane].abs_diff(centre))]);
-            let grey = simd.load(&grey.map(f32::from));
-            let weight = simd.mul(simd.load(&offsets.weight), simd.load(&likeness));
-            total = simd.add(total, weight);
-            sum = simd.mul_add(weight, grey, sum);
-            self.weights[index] = simd.store(weight);
-            self.weighted[index] = simd.store(grey);
-        }
         let scale = 1.0 / simd.sum(total).max(f32::MIN_POSITIVE);
         self.mean = simd.sum(sum) * scale;
         self.normalise(simd, scale);
@@ -251,7 +255,7 @@ pub fn patch_cost<S: Simd>(
     let (sum, squares, products) = (simd.sum(sum), simd.sum(squares), simd.sum(products));
     let variance = squares - sum * sum;
     // Written so that a variance that is not a number has no texture.
-    if variance >= window.min_variance {
+    if variance >= window.min_variance * (WEIGHTS * WEIGHTS) {
         (1.0 - products / variance.sqrt()).clamp(0.0, MAX_COST)
     } else {
         MAX_COST
@@ -279,16 +283,17 @@ pub fn patch_costs<'a, S: Simd>(
     }
     let (sum, squares, products) = (simd.sums(&sums), simd.sums(&squares), simd.sums(&products));
     let variance = simd.sub(squares, simd.mul(sum, sum));
-    let least = if patch.has_texture(window) { window.min_variance } else { f32::INFINITY };
+    let least =
+        if patch.has_texture(window) { window.min_variance * (WEIGHTS * WEIGHTS) } else { f32::INFINITY };
     let has_texture = simd.at_least(variance, simd.splat(least));
     let ncc = simd.div(products, simd.sqrt(variance));
     let cost = simd.min(simd.max(simd.sub(simd.splat(1.0), ncc), zero), simd.splat(MAX_COST));
     let cost = simd.store(cost);
-    std::array::from_fn(|lane| if has_texture >> lane & 1 != 0 { cost[lane] } else { MAX_COST })
+    from_fn(|lane| if has_texture >> lane & 1 != 0 { cost[lane] } else { MAX_COST })
 }
 
 /// The weighted sums over a patch's image in a source view, eight samples a vector: of the differences to the
-/// reference's mean, of their squares, and of their products with the reference.
+/// reference's mean, of their squares, and of their products with the reference. A grey value counts [`WEIGHTS`].
 #[inline(always)]
 fn correlate<S: Simd>(
     simd: S,
@@ -297,19 +302,53 @@ fn correlate<S: Simd>(
     source: &PackedImage,
     homography: &PatchHomography,
 ) -> [S::F32; 3] {
-    let zero = simd.splat(0.0);
     let warp = Warp::new(simd, source, homography);
-    let mean = simd.splat(patch.mean);
-    let (mut sum, mut squares, mut products) = (zero, zero, zero);
-    for (offsets, (weight, weighted)) in window.offsets.iter().zip(patch.weights.iter().zip(&patch.weighted))
-    {
-        let grey = warp.sample(simd, source, simd.load(&offsets.x), simd.load(&offsets.y));
-        // About the reference's mean: single-pass sums in f32 lose digits in low contrast.
-        let difference = simd.sub(grey, mean);
-        let share = simd.mul(simd.load(weight), difference);
-        sum = simd.add(sum, share);
-        squares = simd.mul_add(share, difference, squares);
-        products = simd.mul_add(simd.load(weighted), difference, products);
+    let (pairs, rest) = (&window.mirrored[..], &window.rest[..]);
+    // The loops over the vectors of the usual windows of 16 and 24 samples are rolled out.
+    match (pairs, rest) {
+        ([pair], []) => correlate_vectors(simd, from_ref(pair), &[], patch, &warp),
+        ([pair], [last]) => correlate_vectors(simd, from_ref(pair), from_ref(last), patch, &warp),
+        _ => correlate_vectors(simd, pairs, rest, patch, &warp),
     }
-    [sum, squares, products]
+}
+
+#[inline(always)]
+fn correlate_vectors<S: Simd>(
+    simd: S,
+    pairs: &[[Offsets; 2]],
+    rest: &[Offsets],
+    patch: &ReferencePatch,
+    warp: &Warp<S>,
+) -> [S::F32; 3] {
+    let mean = simd.splat(patch.mean * WEIGHTS);
+    let mut sums = [simd.splat(0.0); 3];
+    let mut sides = patch.weights.iter().zip(&patch.weighted);
+    for [offsets, _] in pairs {
+        let both = warp.sample_mirrored(simd, simd.load(&offsets.x), simd.load(&offsets.y));
+        for (grey, side) in both.into_iter().zip(&mut sides) {
+            sums = add(simd, sums, side, simd.sub(grey, mean));
+        }
+    }
+    for (offsets, side) in rest.iter().zip(sides) {
+        let grey = warp.sample(simd, simd.load(&offsets.x), simd.load(&offsets.y));
+        sums = add(simd, sums, side, simd.sub(grey, mean));
+    }
+    sums
+}
+
+/// Adds a vector's samples to the sums of [`correlate`]: about the reference's mean, since single-pass sums in f32 lose
+/// digits in low contrast.
+#[inline(always)]
+fn add<S: Simd>(
+    simd: S,
+    [sum, squares, products]: [S::F32; 3],
+    (weight, weighted): (&[f32; LANES], &[f32; LANES]),
+    difference: S::F32,
+) -> [S::F32; 3] {
+    let share = simd.mul(simd.load(weight), difference);
+    [
+        simd.add(sum, share),
+        simd.mul_add(share, difference, squares),
+        simd.mul_add(simd.load(weighted), difference, products),
+    ]
 }

@@ -2,52 +2,63 @@
 
 use super::PatchHomography;
 use crate::image::PackedImage;
-use crate::simd::Simd;
+use crate::simd::{PARTS, Simd, Taps};
 use glam::Vec3;
 
-/// A homography and the source's border, in all lanes.
+/// A homography in all lanes and the source's image.
 #[derive(Clone, Copy)]
-pub(super) struct Warp<S: Simd> {
+pub(super) struct Warp<'a, S: Simd> {
     centre: [S::F32; 3],
     along_x: [S::F32; 3],
     along_y: [S::F32; 3],
-    right: S::F32,
-    bottom: S::F32,
+    source: &'a Taps,
 }
 
-impl<S: Simd> Warp<S> {
+impl<'a, S: Simd> Warp<'a, S> {
     #[inline(always)]
-    pub fn new(simd: S, source: &PackedImage, homography: &PatchHomography) -> Warp<S> {
+    pub fn new(simd: S, source: &'a PackedImage, homography: &PatchHomography) -> Warp<'a, S> {
         Warp {
             centre: splat(simd, homography.centre),
             along_x: splat(simd, homography.along_x),
             along_y: splat(simd, homography.along_y),
-            right: simd.splat((source.width - 1) as f32),
-            bottom: simd.splat((source.height - 1) as f32),
+            source: &source.taps,
         }
     }
 
-    /// The bilinear samples at these offsets from the pixel; beyond the border it repeats itself.
+    /// The [`Simd::bilinear`] samples at these offsets from the pixel; on the source camera's plane one at the border.
     #[inline(always)]
-    pub fn sample(&self, simd: S, source: &PackedImage, dx: S::F32, dy: S::F32) -> S::F32 {
-        let zero = simd.splat(0.0);
-        let inverse_z = simd.div(simd.splat(1.0), self.at(simd, 2, dx, dy));
-        // max gives 0 for what is not a number: samples on the source camera's plane.
-        let x = simd.min(simd.max(simd.mul(self.at(simd, 0, dx, dy), inverse_z), zero), self.right);
-        let y = simd.min(simd.max(simd.mul(self.at(simd, 1, dx, dy), inverse_z), zero), self.bottom);
-        let (column, row) = (simd.whole(x), simd.whole(y));
-        let (fraction_x, fraction_y) = (simd.sub(x, column), simd.sub(y, row));
-        let [top_left, bottom_left, top_right, bottom_right] =
-            simd.gather_bytes(&source.pairs, source.stride(), column, row);
-        let top = simd.mul_add(fraction_x, simd.sub(top_right, top_left), top_left);
-        let low = simd.mul_add(fraction_x, simd.sub(bottom_right, bottom_left), bottom_left);
-        simd.mul_add(fraction_y, simd.sub(low, top), top)
+    pub fn sample(&self, simd: S, dx: S::F32, dy: S::F32) -> S::F32 {
+        let [x, y, z] = self.centre;
+        let [step_x, step_y, step_z] = self.step(simd, dx, dy);
+        self.read(simd, [simd.add(x, step_x), simd.add(y, step_y), simd.add(z, step_z)])
     }
-    /// A homogeneous coordinate of the samples.
+
+    /// The samples at these offsets and at their opposites.
     #[inline(always)]
-    fn at(&self, simd: S, axis: usize, dx: S::F32, dy: S::F32) -> S::F32 {
-        let across = simd.mul_add(dx, self.along_x[axis], self.centre[axis]);
-        simd.mul_add(dy, self.along_y[axis], across)
+    pub fn sample_mirrored(&self, simd: S, dx: S::F32, dy: S::F32) -> [S::F32; 2] {
+        let [x, y, z] = self.centre;
+        let [step_x, step_y, step_z] = self.step(simd, dx, dy);
+        [
+            self.read(simd, [simd.add(x, step_x), simd.add(y, step_y), simd.add(z, step_z)]),
+            self.read(simd, [simd.sub(x, step_x), simd.sub(y, step_y), simd.sub(z, step_z)]),
+        ]
+    }
+
+    /// The samples at homogeneous places.
+    #[inline(always)]
+    fn read(&self, simd: S, [x, y, z]: [S::F32; 3]) -> S::F32 {
+        let parts_per_z = simd.div(simd.splat(PARTS), z);
+        simd.bilinear(self.source, simd.mul(x, parts_per_z), simd.mul(y, parts_per_z))
+    }
+
+    /// How far the homogeneous coordinates of the samples are from the pixel's.
+    #[inline(always)]
+    fn step(&self, simd: S, dx: S::F32, dy: S::F32) -> [S::F32; 3] {
+        let mut steps = self.centre;
+        for (axis, step) in steps.iter_mut().enumerate() {
+            *step = simd.mul_add(dy, self.along_y[axis], simd.mul(dx, self.along_x[axis]));
+        }
+        steps
     }
 }
 

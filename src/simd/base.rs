@@ -1,6 +1,7 @@
 //! Vectors of the compile target's baseline, by way of `wide`.
 
-use super::{LANES, Level, Scalar, Simd};
+use super::{LANES, Level, PARTS, Scalar, Simd, Taps};
+use std::array::from_fn;
 use wide::f32x8;
 
 /// The baseline back-end: SSE2 on x86-64, NEON on AArch64, simd128 on wasm.
@@ -76,15 +77,33 @@ impl Simd for Base {
         Scalar.places(strides, x.to_array(), y.to_array())
     }
 
-    // `wide` has no gather: lanes are read one by one.
+    // `wide` has no gather: lanes are read one by one. Samples are whole and below 2^24, so f32 holds them exactly in
+    // whatever order they are worked out.
     #[inline(always)]
-    fn gather_bytes(self, pairs: &[u16], stride: usize, x: f32x8, y: f32x8) -> [f32x8; 4] {
-        Scalar.gather_bytes(pairs, stride, x.to_array(), y.to_array()).map(f32x8::new)
+    fn bilinear(self, image: &Taps, x: f32x8, y: f32x8) -> f32x8 {
+        let (right, bottom) = image.last();
+        let x = self.min(self.max(x, f32x8::ZERO), f32x8::splat(right)).trunc();
+        let y = self.min(self.max(y, f32x8::ZERO), f32x8::splat(bottom)).trunc();
+        let part = f32x8::splat(1.0 / PARTS);
+        let (column, row) = ((x * part).trunc(), (y * part).trunc());
+        let (part_x, part_y) = (x - column * f32x8::splat(PARTS), y - row * f32x8::splat(PARTS));
+        let pairs: [[[i8; 2]; 2]; LANES] = {
+            let (column, row) = (column.to_array(), row.to_array());
+            from_fn(|lane| {
+                let index = row[lane] as u32 as usize * image.stride() + column[lane] as u32 as usize;
+                [image.pairs()[index], image.pairs()[index + 1]]
+            })
+        };
+        let tap = |right: usize, low: usize| f32x8::new(from_fn(|lane| f32::from(pairs[lane][right][low])));
+        let all = f32x8::splat(255.0);
+        let left = (all - part_y) * tap(0, 0) + part_y * tap(0, 1);
+        let right = (all - part_y) * tap(1, 0) + part_y * tap(1, 1);
+        (all - part_x) * left + part_x * right
     }
 
     #[inline(always)]
-    fn look_up(self, table: &[f32; 256], a: f32x8) -> f32x8 {
-        f32x8::new(Scalar.look_up(table, a.to_array()))
+    fn gather(self, image: &Taps, pairs: &[u32; LANES]) -> [u32; LANES] {
+        Scalar.gather(image, pairs)
     }
 
     #[inline(always)]

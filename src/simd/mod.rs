@@ -7,12 +7,14 @@
 mod base;
 mod level;
 mod scalar;
+mod taps;
 #[cfg(target_arch = "x86_64")]
 mod x86_v3;
 
 pub use base::Base;
 pub use level::{Level, Task, dispatch};
 pub use scalar::Scalar;
+pub use taps::{PARTS, Taps, WEIGHTS};
 #[cfg(target_arch = "x86_64")]
 pub use x86_v3::X86V3;
 
@@ -52,11 +54,13 @@ pub trait Simd: Copy + Send + Sync {
     fn whole(self, a: Self::F32) -> Self::F32;
     /// `y * stride + x` for whole, non-negative lanes, with a stride for each.
     fn places(self, strides: &[i32; LANES], x: Self::F32, y: Self::F32) -> [u32; LANES];
-    /// The four bytes, lowest first, of the pairs at `y * stride + x` and after it, for whole, non-negative `x` and `y`.
-    /// An index beyond the last two pairs reads those; there must be two.
-    fn gather_bytes(self, pairs: &[u16], stride: usize, x: Self::F32, y: Self::F32) -> [Self::F32; 4];
-    /// `table[a]` for whole lanes in [0, 255].
-    fn look_up(self, table: &[f32; 256], a: Self::F32) -> Self::F32;
+    /// Bilinear samples at places in 256ths of a pixel ([`PARTS`]); the image repeats its border, and what is not a number
+    /// is 0. Of a place only the whole 256ths count, and f of them between two pixels weigh `255 - f` to `f`, so a sample
+    /// is a whole number: the grey value less 128, times 255 squared ([`WEIGHTS`]).
+    fn bilinear(self, image: &Taps, x: Self::F32, y: Self::F32) -> Self::F32;
+    /// The four taps, lowest byte first, that [`Simd::bilinear`] reads for samples between these pairs and the next ones;
+    /// an index beyond the last two pairs reads those. No more than reading: what sampling costs at least.
+    fn gather(self, image: &Taps, pairs: &[u32; LANES]) -> [u32; LANES];
     /// The sum of the lanes, as `((l0 + l4) + (l2 + l6)) + ((l1 + l5) + (l3 + l7))`.
     fn sum(self, a: Self::F32) -> f32;
     /// The largest lane; no lane may be anything else than a number.

@@ -1,6 +1,6 @@
 //! One lane at a time: what the other back-ends are tested against.
 
-use super::{LANES, Level, Simd};
+use super::{LANES, Level, Simd, Taps};
 use std::array::from_fn;
 
 /// The scalar back-end.
@@ -77,18 +77,29 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
-    fn gather_bytes(self, pairs: &[u16], stride: usize, x: Self::F32, y: Self::F32) -> [Self::F32; 4] {
-        let bytes: [[u8; 4]; LANES] = from_fn(|lane| {
-            let index = (y[lane] as usize * stride + x[lane] as usize).min(pairs.len() - 2);
-            let ([a, b], [c, d]) = (pairs[index].to_le_bytes(), pairs[index + 1].to_le_bytes());
-            [a, b, c, d]
-        });
-        from_fn(|tap| from_fn(|lane| f32::from(bytes[lane][tap])))
+    fn bilinear(self, image: &Taps, x: Self::F32, y: Self::F32) -> Self::F32 {
+        let (right, bottom) = image.last();
+        let x = self.min(self.max(x, [0.0; LANES]), [right; LANES]);
+        let y = self.min(self.max(y, [0.0; LANES]), [bottom; LANES]);
+        from_fn(|lane| {
+            let (x, y) = (x[lane] as u32, y[lane] as u32);
+            let index = (y >> 8) as usize * image.stride() + (x >> 8) as usize;
+            let ([top_left, bottom_left], [top_right, bottom_right]) =
+                (image.pairs()[index], image.pairs()[index + 1]);
+            let between = |part: u32, a: i32, b: i32| (255 - part as i32) * a + part as i32 * b;
+            let left = between(y & 0xff, top_left.into(), bottom_left.into());
+            let right = between(y & 0xff, top_right.into(), bottom_right.into());
+            between(x & 0xff, left, right) as f32
+        })
     }
 
     #[inline(always)]
-    fn look_up(self, table: &[f32; 256], a: Self::F32) -> Self::F32 {
-        from_fn(|lane| table[usize::from(a[lane] as u8)])
+    fn gather(self, image: &Taps, pairs: &[u32; LANES]) -> [u32; LANES] {
+        pairs.map(|index| {
+            let index = (index as usize).min(image.pairs().len() - 2);
+            let ([a, b], [c, d]) = (image.pairs()[index], image.pairs()[index + 1]);
+            u32::from_le_bytes([a, b, c, d].map(|tap| tap as u8))
+        })
     }
 
     #[inline(always)]

@@ -1,7 +1,7 @@
 //! AVX2 by way of `core::arch`: `wide` does not become AVX2 code inside a `target_feature` function.
 #![allow(unsafe_code)]
 
-use super::{LANES, Level, Simd};
+use super::{LANES, Level, Simd, Taps};
 use core::arch::x86_64::*;
 
 /// The AVX2 back-end. Owning one proves that the machine has AVX2.
@@ -20,6 +20,36 @@ impl X86V3 {
 }
 
 impl X86V3 {
+    /// The pairs at these indices and the ones after them, four bytes a lane. Eight loads instead of a gather instruction,
+    /// which Intel's microcode has slowed down and which gains nothing on Zen 3.
+    ///
+    /// # Safety
+    /// Every index is below the last pair's.
+    #[inline(always)]
+    unsafe fn read(self, image: &Taps, indices: __m256i) -> __m256i {
+        // SAFETY: AVX2 is there: `self` exists. The caller's word is that two pairs lie at each index; the read may be
+        // unaligned.
+        unsafe {
+            let (low, high) = (_mm256_castsi256_si128(indices), _mm256_extracti128_si256::<1>(indices));
+            let two = |index: u64| image.pairs().as_ptr().add(index as usize).cast::<i32>().read_unaligned();
+            // Two indices in 64 bits.
+            let (a, b) = (_mm_cvtsi128_si64(low) as u64, _mm_extract_epi64::<1>(low) as u64);
+            let (c, d) = (_mm_cvtsi128_si64(high) as u64, _mm_extract_epi64::<1>(high) as u64);
+            let first = |both: u64| two(both & 0xffff_ffff);
+            let second = |both: u64| two(both >> 32);
+            _mm256_setr_epi32(
+                first(a),
+                second(a),
+                first(b),
+                second(b),
+                first(c),
+                second(c),
+                first(d),
+                second(d),
+            )
+        }
+    }
+
     /// `l0 + l4, l1 + l5, l2 + l6, l3 + l7` of `a`, then of `b`.
     #[inline(always)]
     fn add_halves(self, a: __m256, b: __m256) -> __m256 {
@@ -138,37 +168,45 @@ impl Simd for X86V3 {
     }
 
     #[inline(always)]
-    fn gather_bytes(self, pairs: &[u16], stride: usize, x: __m256, y: __m256) -> [__m256; 4] {
-        assert!(pairs.len() >= 2 && pairs.len() <= i32::MAX as usize);
-        // Eight loads instead of a gather instruction: a fifth faster for a whole patch on Zen 5, and Intel's gather has
-        // been slowed down by microcode.
-        // SAFETY: AVX2 is there. Each index is clamped, as unsigned, to the last pair but one, and the pairs fit an i32
-        // as the assertion says, so every lane reads two pairs inside the slice; the read may be unaligned.
+    fn bilinear(self, image: &Taps, x: __m256, y: __m256) -> __m256 {
+        let (right, bottom) = image.last();
+        // SAFETY: AVX2 is there. Coordinates are brought into [0, right] and [0, bottom], `max` making 0 of what is not a
+        // number, so with the image's stride every index is that of a pair that has another one after it.
         unsafe {
-            let row = _mm256_mullo_epi32(_mm256_cvttps_epi32(y), _mm256_set1_epi32(stride as i32));
-            let index = _mm256_add_epi32(row, _mm256_cvttps_epi32(x));
-            let index = _mm256_min_epu32(index, _mm256_set1_epi32((pairs.len() - 2) as i32));
-            let mut at = [0u32; LANES];
-            _mm256_storeu_si256(at.as_mut_ptr().cast(), index);
-            let two = |lane: usize| pairs.as_ptr().add(at[lane] as usize).cast::<i32>().read_unaligned();
-            let word = _mm256_setr_epi32(two(0), two(1), two(2), two(3), two(4), two(5), two(6), two(7));
-            let byte = _mm256_set1_epi32(0xff);
-            [
-                _mm256_cvtepi32_ps(_mm256_and_si256(word, byte)),
-                _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32::<8>(word), byte)),
-                _mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srli_epi32::<16>(word), byte)),
-                _mm256_cvtepi32_ps(_mm256_srli_epi32::<24>(word)),
-            ]
+            let zero = _mm256_setzero_ps();
+            let x = _mm256_cvttps_epi32(_mm256_min_ps(_mm256_max_ps(x, zero), _mm256_set1_ps(right)));
+            let y = _mm256_cvttps_epi32(_mm256_min_ps(_mm256_max_ps(y, zero), _mm256_set1_ps(bottom)));
+            let stride = _mm256_set1_epi32(image.stride() as i32);
+            let row = _mm256_mullo_epi32(_mm256_srli_epi32::<8>(y), stride);
+            let taps = self.read(image, _mm256_add_epi32(row, _mm256_srli_epi32::<8>(x)));
+            // The lowest byte of a coordinate is what weighs the lower or right taps; 255 less it the upper or left ones.
+            let four_times = _mm256_setr_epi8(
+                0, 0, 0, 0, 4, 4, 4, 4, 8, 8, 8, 8, 12, 12, 12, 12, //
+                0, 0, 0, 0, 4, 4, 4, 4, 8, 8, 8, 8, 12, 12, 12, 12,
+            );
+            let twice_as_i16 = _mm256_setr_epi8(
+                0, -1, 0, -1, 4, -1, 4, -1, 8, -1, 8, -1, 12, -1, 12, -1, //
+                0, -1, 0, -1, 4, -1, 4, -1, 8, -1, 8, -1, 12, -1, 12, -1,
+            );
+            let down = _mm256_xor_si256(_mm256_shuffle_epi8(y, four_times), _mm256_set1_epi32(0x00ff_00ff));
+            let along = _mm256_xor_si256(_mm256_shuffle_epi8(x, twice_as_i16), _mm256_set1_epi32(0xff));
+            // No sum saturates: a pair's is at most 255 * 128.
+            let sides = _mm256_maddubs_epi16(down, taps);
+            _mm256_cvtepi32_ps(_mm256_madd_epi16(sides, along))
         }
     }
 
     #[inline(always)]
-    fn look_up(self, table: &[f32; 256], a: __m256) -> __m256 {
-        // SAFETY: AVX2 is there, and every index is reduced to the table's 256 entries.
+    fn gather(self, image: &Taps, pairs: &[u32; LANES]) -> [u32; LANES] {
+        let mut taps = [0; LANES];
+        // SAFETY: AVX2 is there; the arrays hold the eight integers that are read and written, aligned or not. Each index
+        // is clamped, as unsigned, to the last pair but one.
         unsafe {
-            let index = _mm256_and_si256(_mm256_cvttps_epi32(a), _mm256_set1_epi32(0xff));
-            _mm256_i32gather_ps::<4>(table.as_ptr(), index)
+            let last = _mm256_set1_epi32((image.pairs().len() - 2) as i32);
+            let index = _mm256_min_epu32(_mm256_loadu_si256(pairs.as_ptr().cast()), last);
+            _mm256_storeu_si256(taps.as_mut_ptr().cast(), self.read(image, index));
         }
+        taps
     }
 
     #[inline(always)]
