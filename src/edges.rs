@@ -298,6 +298,7 @@ mod tests {
             normal: Vec3::NEG_Z,
             consistent: 3,
             validated: true,
+            ..Solution::default()
         };
         (0..(SIZE.0 * SIZE.1) as usize).map(of).collect()
     }

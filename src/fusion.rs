@@ -19,7 +19,7 @@ use glam::{DVec2, DVec3};
 pub use overlap::overlaps;
 use rayon::prelude::*;
 use source::{Opinion, Source};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A view with its maps, as fusion needs it.
 #[derive(Debug, Clone, Copy)]
@@ -50,10 +50,7 @@ pub fn fuse(views: &[FusionView], options: &FusionOptions, hook: Hook) -> Result
     for index in 0..views.len() {
         check_view(views, index)?;
     }
-    let used: Vec<Vec<AtomicBool>> = views
-        .iter()
-        .map(|view| (0..view.camera.pixels()).map(|_| AtomicBool::new(false)).collect())
-        .collect();
+    let used: Vec<Used> = views.iter().map(|view| Used::none_of(view.camera.pixels())).collect();
     let total_rows: u64 = views.iter().map(|view| u64::from(view.camera.height)).sum();
     let mut rows_done = 0;
     let report = |view: usize, rows_done: u64| {
@@ -132,6 +129,23 @@ fn estimate(view: &FusionView, pixel: usize) -> Option<(f64, DVec3)> {
     (depth > 0.0 && depth.is_finite()).then_some((f64::from(depth), normal))
 }
 
+/// The pixels of a view that are part of a point, a bit each.
+struct Used(Vec<AtomicU64>);
+
+impl Used {
+    fn none_of(pixels: usize) -> Used {
+        Used((0..pixels.div_ceil(64)).map(|_| AtomicU64::new(0)).collect())
+    }
+
+    fn has(&self, pixel: usize) -> bool {
+        self.0[pixel / 64].load(Ordering::Relaxed) >> (pixel % 64) & 1 != 0
+    }
+
+    fn add(&self, pixel: usize) {
+        self.0[pixel / 64].fetch_or(1 << (pixel % 64), Ordering::Relaxed);
+    }
+}
+
 /// The view whose pixels become points. Positions are relative to its centre: large world coordinates lose no digits.
 struct Reference<'a> {
     views: &'a [FusionView<'a>],
@@ -140,16 +154,11 @@ struct Reference<'a> {
     sources: Vec<Source<'a>>,
     /// By view and pixel, whether the pixel is part of a point. While one view is the reference, its own flags are only
     /// read and those of the others only set: the order of the threads does not matter.
-    used: &'a [Vec<AtomicBool>],
+    used: &'a [Used],
 }
 
 impl<'a> Reference<'a> {
-    fn new(
-        views: &'a [FusionView<'a>],
-        index: usize,
-        options: &'a FusionOptions,
-        used: &'a [Vec<AtomicBool>],
-    ) -> Self {
+    fn new(views: &'a [FusionView<'a>], index: usize, options: &'a FusionOptions, used: &'a [Used]) -> Self {
         let sources = views[index]
             .overlap
             .iter()
@@ -165,7 +174,7 @@ impl<'a> Reference<'a> {
         let (mut members, mut point_views) = (Vec::new(), Vec::new());
         for column in 0..view.camera.width {
             let pixel = first + column as usize;
-            if self.used[self.index][pixel].load(Ordering::Relaxed) {
+            if self.used[self.index].has(pixel) {
                 continue;
             }
             let Some((depth, normal)) = estimate(view, pixel) else { continue };
@@ -181,7 +190,7 @@ impl<'a> Reference<'a> {
                 continue;
             }
             for member in &members[1..] {
-                self.used[member.view as usize][member.pixel].store(true, Ordering::Relaxed);
+                self.used[member.view as usize].add(member.pixel);
             }
             point_views.clear();
             point_views.extend(members.iter().map(|member| member.view));

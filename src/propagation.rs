@@ -101,7 +101,7 @@ fn given(
         if let Some((target, depth)) = land(camera, point, normal, range)
             && !is_settled(&state.solutions[target])
         {
-            let offer = Offer { depth, normal: normal.as_vec3(), cost: giver.state.cost[pixel] };
+            let offer = Offer { depth, normal: normal.as_vec3(), cost: solution.cost.into() };
             offers.push((target, Ranked { offer, view: giver.view }));
         }
     }
@@ -126,6 +126,7 @@ fn land(camera: &Camera, point: DVec3, normal: DVec3, range: DepthRange) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::state::ShortCost;
     use crate::testing::{self, RANGE, World};
     use glam::Vec3;
 
@@ -160,7 +161,7 @@ mod tests {
             // Points land beside the pixel's centre, and the wall is slanted: only its plane is exact.
             assert!((offer.depth / testing::depth(camera, pixel) - 1.0).abs() < 1e-5);
             assert!(offer.normal.distance(testing::normal(camera)) < 1e-5);
-            assert_eq!(offer.cost, 0.1);
+            assert_eq!(offer.cost, f32::from(ShortCost::from(0.1)));
         }
     }
 
@@ -209,8 +210,9 @@ mod tests {
         (world.cameras[2], world.cameras[3]) = (world.cameras[1], world.cameras[1]);
         let tilt = |state: &ViewState, x: f32, cost: f32| {
             let mut state = state.clone();
-            state.solutions.iter_mut().for_each(|s| s.normal = (s.normal + x * Vec3::X).normalize());
-            state.cost.fill(cost);
+            state.solutions.iter_mut().for_each(|s| {
+                *s = Solution { normal: (s.normal + x * Vec3::X).normalize(), cost: cost.into(), ..*s };
+            });
             state
         };
         givers[1] = tilt(&givers[0], 0.1, 0.1);

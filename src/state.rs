@@ -15,10 +15,30 @@ pub struct Solution {
     pub depth: f32,
     /// Unit normal in the camera frame, facing the camera.
     pub normal: Vec3,
+    /// Aggregated cost of the search that found it.
+    pub cost: ShortCost,
     /// Source views the last check found consistent with it.
     pub consistent: u8,
     /// Whether that check validated it.
     pub validated: bool,
+}
+
+/// A cost in two bytes, since it does no more between searches than rank what views offer each other: the upper half of
+/// an f32's bits, a relative error of 2^-8 at most.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ShortCost(u16);
+
+impl From<f32> for ShortCost {
+    fn from(cost: f32) -> ShortCost {
+        // To the nearest: what is added carries no number beyond infinity.
+        ShortCost((cost.to_bits().saturating_add(0x8000) >> 16) as u16)
+    }
+}
+
+impl From<ShortCost> for f32 {
+    fn from(cost: ShortCost) -> f32 {
+        f32::from_bits(u32::from(cost.0) << 16)
+    }
 }
 
 /// The solutions of one view on one scale.
@@ -26,8 +46,6 @@ pub struct Solution {
 pub struct ViewState {
     /// Row by row.
     pub solutions: Vec<Solution>,
-    /// Aggregated cost of each solution.
-    pub cost: Vec<f32>,
     /// The view set each was matched with.
     pub sets: ViewSets,
     /// The validated solutions as other views look them up.
@@ -86,12 +104,11 @@ impl ViewState {
         };
         let solutions: Vec<Solution> = (0..fine.pixels()).into_par_iter().map(refine).collect();
         let surface = shown(fine, &solutions);
-        let cost = (0..fine.pixels()).into_par_iter().map(|pixel| self.cost[parent(pixel)]).collect();
         let sets = match self.sets.is_clear() {
             true => self.sets.clone(),
             false => self.sets.of((0..fine.pixels()).map(parent)),
         };
-        ViewState { solutions, cost, sets, surface }
+        ViewState { solutions, sets, surface }
     }
 }
 
@@ -127,6 +144,17 @@ fn planes(camera: &Camera, solutions: &[Solution]) -> impl IndexedParallelIterat
 mod tests {
     use super::*;
     use crate::testing::{self, RANGE};
+
+    #[test]
+    fn costs_are_kept_to_a_256th_and_in_their_order() {
+        let costs = [0.0, 1e-3, 0.1, 0.101, 0.9, 2.0, 2.3, f32::INFINITY];
+        let kept = costs.map(|cost| f32::from(ShortCost::from(cost)));
+        assert!(kept.is_sorted());
+        for (cost, kept) in costs.into_iter().zip(kept) {
+            assert!(kept == cost || (kept - cost).abs() <= cost / 256.0, "{kept} for {cost}");
+        }
+        assert_eq!(size_of::<Solution>(), 20, "the cost takes no room of its own");
+    }
 
     #[test]
     fn a_plane_is_handed_up_exactly_also_to_odd_sizes() {

@@ -64,14 +64,11 @@ pub fn exact(camera: &Camera) -> ViewState {
     let solution = |pixel| Solution {
         depth: depth(camera, pixel),
         normal: normal(camera),
+        cost: 0.1.into(),
         consistent: 1,
         validated: false,
     };
-    ViewState {
-        solutions: (0..camera.pixels()).map(solution).collect(),
-        cost: vec![0.1; camera.pixels()],
-        ..ViewState::default()
-    }
+    ViewState { solutions: (0..camera.pixels()).map(solution).collect(), ..ViewState::default() }
 }
 
 /// A camera at `x` on a line parallel to the wall's foot, turned so that it sees the same part of the wall.

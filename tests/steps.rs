@@ -110,15 +110,12 @@ fn maps_of_the_host_s_own_validate_and_guide_another_view() {
     };
     assert!(good(&helped) > good(&alone), "{} with neighbours, {} without", good(&helped), good(&alone));
     let mut offered = neighbours.clone();
+    let costs: Vec<f32> = helped.cost().collect();
     offered[0] = State::from_maps(
         &steps,
         1,
         0,
-        &OwnMaps {
-            maps: &helped.maps(),
-            validated: Some(&vec![false; helped.pixels()]),
-            cost: Some(helped.cost()),
-        },
+        &OwnMaps { maps: &helped.maps(), validated: Some(&vec![false; helped.pixels()]), cost: Some(&costs) },
     )
     .unwrap();
     let offers = steps.propagate(1, 0, &some(&offered)).unwrap();

@@ -48,7 +48,7 @@ impl skep_state {
 /// Makes a state from the caller's own maps, as if it had been checked in `step`. The maps have the size that
 /// skep_steps_get_size tells for that step: `depth` in world units, 0 for none; `normal` unit x, y, z in the camera
 /// frame, facing the camera, where there is a depth. `validated_or_null`: one byte a pixel, not 0 where the solution
-/// counts as validated; NULL validates all that have a depth. `cost_or_null`: at least 0, ranks what is offered to other
+/// counts as validated; NULL validates all that have a depth. `cost_or_null`: at least 0, kept to a 256th, ranks what is offered to other
 /// views; NULL is 0. Strides in bytes; those of NULL maps are ignored.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_state_from_maps(
@@ -133,7 +133,7 @@ pub unsafe extern "C" fn skep_state_get_info(
 }
 
 /// Copies a state's maps, row after row without gaps, `capacity` pixels of room in each: `depth` (1 float a pixel, 0
-/// where there is none), `normal` (3 floats), `cost` (1 float, the aggregated cost of the search), `validated` (1 byte, 1
+/// where there is none), `normal` (3 floats), `cost` (1 float, the aggregated cost of the search, to a 256th), `validated` (1 byte, 1
 /// where the check validated the solution). Any of them may be NULL.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_state_get_maps(
@@ -147,7 +147,7 @@ pub unsafe extern "C" fn skep_state_get_maps(
     guard(|| {
         // SAFETY: as the header demands of the caller.
         let state = &unsafe { get(state, "state") }?.state;
-        let maps = state.maps();
+        let (maps, costs) = (state.maps(), state.cost().collect::<Vec<f32>>());
         let verdicts: Vec<u8> = state.verdicts().map(|verdict| u8::from(verdict.1)).collect();
         let needed = state.pixels();
         // SAFETY: as the header demands of the caller.
@@ -158,7 +158,7 @@ pub unsafe extern "C" fn skep_state_get_maps(
             let validated = wanted(validated, capacity, needed, "validated")?;
             depth.into_iter().for_each(|out| out.set(&maps.depth));
             normal.into_iter().for_each(|out| out.set(&maps.normal));
-            cost.into_iter().for_each(|out| out.set(state.cost()));
+            cost.into_iter().for_each(|out| out.set(&costs));
             validated.into_iter().for_each(|out| out.set(&verdicts));
         }
         Ok(())

@@ -16,7 +16,7 @@ impl State {
     /// The state as bytes, all numbers little-endian. Only [`State::from_bytes`] of the same version of the crate is
     /// meant to read them.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let ViewState { solutions, cost, sets, .. } = &self.solved;
+        let ViewState { solutions, sets, .. } = &self.solved;
         let words = sets.words_per_pixel();
         let mut bytes = Vec::with_capacity(self.byte_len());
         let mut put = |part: &[u8]| bytes.extend_from_slice(part);
@@ -37,9 +37,8 @@ impl State {
             }
         }
         for (pixel, solution) in solutions.iter().enumerate() {
-            for number in
-                [solution.depth, solution.normal.x, solution.normal.y, solution.normal.z, cost[pixel]]
-            {
+            let Solution { depth, normal, cost, .. } = *solution;
+            for number in [depth, normal.x, normal.y, normal.z, cost.into()] {
                 put(&number.to_le_bytes());
             }
             put(&[solution.consistent, u8::from(solution.validated)]);
@@ -125,8 +124,7 @@ impl State {
                 return Err(error(value, "what a search can find".into()));
             }
             verdicts.push((consistent, validated == 1));
-            state.solved.solutions.push(Solution { depth, normal, ..Solution::default() });
-            state.solved.cost.push(cost);
+            state.solved.solutions.push(Solution { depth, normal, cost: cost.into(), ..Solution::default() });
             for word in 0..words {
                 let bits = u32::from_le_bytes(reader.take().unwrap_or([0; 4]));
                 for source in (word * 32..sources.min(word * 32 + 32)).filter(|s| bits >> (s % 32) & 1 != 0) {

@@ -143,8 +143,7 @@ fn finish(steps: &Steps, states: Vec<State>, tracker: &Tracker) -> Result<Vec<Vi
     let closings =
         each_view(vec![(); views], |view, ()| steps.closings(view, &known, &|units| advance(view, units)))?;
     // What closes the gaps is all that a view takes from other views' own states.
-    let (surfaces, mut owns) = shown(states, views);
-    owns.iter_mut().flatten().for_each(|own| own.solved.cost = Vec::new());
+    let (surfaces, owns) = shown(states, views);
     let given = owns.into_iter().flatten().zip(closings).collect();
     each_view(given, |view, (own, closings): (State, Vec<_>)| {
         steps.settle(&own, &|view| &surfaces[view], &closings, &|units| advance(view, units))

@@ -144,8 +144,8 @@ impl Steps {
         };
         if self.sources(view).is_empty() {
             let solutions = vec![Solution::default(); camera.pixels()];
-            let (cost, sets) = (vec![0.0; solutions.len()], ViewSets::empty(solutions.len(), 0));
-            state.solved = ViewState { solutions, cost, sets, ..ViewState::default() };
+            let sets = ViewSets::empty(solutions.len(), 0);
+            state.solved = ViewState { solutions, sets, ..ViewState::default() };
         } else {
             let start = own.map(|own| &own.solved.solutions[..]);
             let offers = offers.and_then(Offers::by_pixel);
@@ -176,11 +176,11 @@ impl Steps {
             let solution = |food: &FoodSource| Solution {
                 depth: food.depth,
                 normal: food.normal,
+                cost: food.cost.into(),
                 ..Solution::default()
             };
             state.solved = ViewState {
                 solutions: found.best.par_iter().map(solution).collect(),
-                cost: found.best.par_iter().map(|food| food.cost).collect(),
                 sets: found.sets,
                 surface: Vec::new(),
             };

@@ -25,7 +25,7 @@ pub struct OwnMaps<'a> {
     pub maps: &'a Maps,
     /// Which solutions count as validated; `None` validates all that have a depth.
     pub validated: Option<&'a [bool]>,
-    /// Cost of each solution, which ranks what is offered to other views; `None` is 0.
+    /// Cost of each solution, which ranks what is offered to other views and is kept to a 256th; `None` is 0.
     pub cost: Option<&'a [f32]>,
 }
 
@@ -77,15 +77,15 @@ impl State {
                 let expected = "a unit vector that faces the camera (n . ray < 0)";
                 return Err(Error::argument(name("normal"), normal, expected));
             }
+            let cost = own.cost.map_or(0.0, |cost| cost[pixel]).into();
             let validated = own.validated.is_none_or(|validated| validated[pixel]);
             let consistent = if validated { steps.options.min_consistent.min(255) as u8 } else { 0 };
-            *solution = Solution { depth, normal: normal.normalize(), consistent, validated };
+            *solution = Solution { depth, normal: normal.normalize(), cost, consistent, validated };
         }
         let verdicts: Vec<(u8, bool)> =
             solutions.iter().map(|solution| (solution.consistent, solution.validated)).collect();
-        let cost = own.cost.map_or_else(|| vec![0.0; pixels], <[f32]>::to_vec);
         let sets = ViewSets::full(pixels, steps.sources(view).len());
-        let mut solved = ViewState { solutions, cost, sets, ..ViewState::default() };
+        let mut solved = ViewState { solutions, sets, ..ViewState::default() };
         solved.mark(camera, &verdicts);
         Ok(State { view, step, marked: true, solved, counts: Counts::default(), cycles: Vec::new() })
     }
@@ -115,9 +115,9 @@ impl State {
         maps_of(&self.solved.solutions)
     }
 
-    /// Aggregated cost of every pixel's solution.
-    pub fn cost(&self) -> &[f32] {
-        &self.solved.cost
+    /// Aggregated cost of every pixel's solution, to a 256th.
+    pub fn cost(&self) -> impl ExactSizeIterator<Item = f32> + '_ {
+        self.solved.solutions.iter().map(|solution| solution.cost.into())
     }
 
     /// For every pixel the number of source views consistent with its solution, at most 255, and whether that validates

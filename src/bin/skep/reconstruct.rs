@@ -25,7 +25,6 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
     display.say(&format!("reading {}", arguments.scene.display()));
     let scene = read_scene(&arguments.scene, depth_range)?;
     require_writable(&output)?;
-    let writers = pool(options.threads)?;
 
     let interrupt = Interrupt::watch();
     let result = solve(&scene, &options, display, &stopwatch, &interrupt)
@@ -36,6 +35,7 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
     stopwatch.enter(Stage::Writing);
     display.say(&format!("writing {}", output.display()));
     let mut report = Report::new(&scene, &arguments.preset, &options, &result);
+    let writers = pool(options.threads)?;
     writers.install(|| write(&output, &arguments.scene, &scene, &result, &interrupt))?;
     report.set_times(stopwatch.times());
     report.write(&report_path(&output))?;
@@ -106,12 +106,13 @@ fn write(
     Workspace::write_cloud(&workspace.cloud(), &result.points)
 }
 
-/// Threads for what the library has no part in; 0 takes one for each core. Started before hours of work, which must not
-/// be lost because there are none.
+/// Threads for what the library has no part in; 0 takes one for each core. Started when the library's threads have ended,
+/// they take over the memory that those have freed. Hours of work are not lost where no thread can be started: the
+/// current one does all of it then.
 fn pool(threads: usize) -> Result<rayon::ThreadPool> {
-    let expected = "a number of threads that the system can start";
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map_err(|error| Error::argument("--threads", threads, format!("{expected} ({error})")))
+    let pool = pool.or_else(|_| rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build());
+    pool.map_err(|error| Error::argument("--threads", threads, error.to_string()))
 }
 
 fn report_path(output: &Path) -> PathBuf {
