@@ -15,6 +15,8 @@ pub struct Placements<S: Simd> {
     groups: Vec<Group>,
     /// Groups that hold the views of the set.
     used: usize,
+    /// The set they are the views of.
+    set: Vec<u32>,
     pixel: (f32, f32),
 }
 
@@ -80,12 +82,16 @@ impl<S: Simd> Placements<S> {
         };
         let views: Vec<Fixed> = reference.sources.iter().map(fixed).collect();
         let groups = vec![Group::new(); views.len().div_ceil(LANES)];
-        Placements { simd, views, groups, used: 0, pixel: (0.0, 0.0) }
+        Placements { simd, views, groups, used: 0, set: Vec::new(), pixel: (0.0, 0.0) }
     }
 
     /// Goes to a pixel and takes the source views of its set.
     #[inline(always)]
     pub fn go_to(&mut self, x: f32, y: f32, set: &[u32]) {
+        // Neighbours often have the same set.
+        if self.set == set {
+            return self.move_to(x, y);
+        }
         self.pixel = (x, y);
         self.keep(set);
     }
@@ -102,6 +108,8 @@ impl<S: Simd> Placements<S> {
     /// Takes another set of source views for the same pixel.
     #[inline(always)]
     pub fn keep(&mut self, set: &[u32]) {
+        self.set.clear();
+        self.set.extend_from_slice(set);
         let mut taken = 0;
         for (index, &word) in set.iter().enumerate() {
             let mut rest = word;
