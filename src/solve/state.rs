@@ -69,6 +69,8 @@ impl State {
             {
                 return Err(Error::argument(name("cost"), cost, "a number of at least 0"));
             }
+            let cost = own.cost.map_or(0.0, |cost| cost[pixel]).into();
+            solution.cost = cost;
             if depth == 0.0 {
                 continue;
             }
@@ -77,7 +79,6 @@ impl State {
                 let expected = "a unit vector that faces the camera (n . ray < 0)";
                 return Err(Error::argument(name("normal"), normal, expected));
             }
-            let cost = own.cost.map_or(0.0, |cost| cost[pixel]).into();
             let validated = own.validated.is_none_or(|validated| validated[pixel]);
             let consistent = if validated { steps.options.min_consistent.min(255) as u8 } else { 0 };
             *solution = Solution { depth, normal: normal.normalize(), cost, consistent, validated };
