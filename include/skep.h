@@ -1098,8 +1098,8 @@ skep_status skep_steps_finish(const struct skep_steps *steps,
  * Makes a state from the caller's own maps, as if it had been checked in `step`. The maps have the size that
  * skep_steps_get_size tells for that step: `depth` in world units, 0 for none; `normal` unit x, y, z in the camera
  * frame, facing the camera, where there is a depth. `validated_or_null`: one byte a pixel, not 0 where the solution
- * counts as validated; NULL validates all that have a depth. `cost_or_null`: at least 0, kept to a 256th, ranks what is offered to other
- * views; NULL is 0. Strides in bytes; those of NULL maps are ignored.
+ * counts as validated; NULL validates all that have a depth. `cost_or_null`: at least 0, kept to a 256th, ranks what is
+ * offered to other views; NULL is 0. Strides in bytes; those of NULL maps are ignored.
  */
 skep_status skep_state_from_maps(const struct skep_steps *steps,
                                  uint32_t step,
@@ -1126,8 +1126,8 @@ skep_status skep_state_get_info(const struct skep_state *state, struct skep_stat
 
 /**
  * Copies a state's maps, row after row without gaps, `capacity` pixels of room in each: `depth` (1 float a pixel, 0
- * where there is none), `normal` (3 floats), `cost` (1 float, the aggregated cost of the search, to a 256th), `validated` (1 byte, 1
- * where the check validated the solution). Any of them may be NULL.
+ * where there is none), `normal` (3 floats), `cost` (1 float, the aggregated cost of the search, to a
+ * 256th), `validated` (1 byte, 1 where the check validated the solution). Any of them may be NULL.
  */
 skep_status skep_state_get_maps(const struct skep_state *state,
                                 float *depth,

@@ -18,6 +18,9 @@ pub struct PackedImage {
 
 impl PackedImage {
     /// Packs a picture's grey values.
+    ///
+    /// # Panics
+    /// When a side is beyond 32,768 pixels, which no camera has.
     pub fn new(picture: &Picture) -> PackedImage {
         let (width, height) = (picture.width() as usize, picture.height() as usize);
         let taps = Taps::new(picture.grey(), width, height);

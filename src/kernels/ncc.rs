@@ -137,6 +137,12 @@ impl Window {
         self.colour_weights[usize::from(a.abs_diff(b))]
     }
 
+    /// The smallest variance of bilinear samples, in which a grey value counts [`WEIGHTS`].
+    #[inline(always)]
+    fn min_variance_of_samples(&self) -> f32 {
+        self.min_variance * (WEIGHTS * WEIGHTS)
+    }
+
     /// Samples of a patch.
     pub fn samples(&self) -> u64 {
         self.samples
@@ -255,7 +261,7 @@ pub fn patch_cost<S: Simd>(
     let (sum, squares, products) = (simd.sum(sum), simd.sum(squares), simd.sum(products));
     let variance = squares - sum * sum;
     // Written so that a variance that is not a number has no texture.
-    if variance >= window.min_variance * (WEIGHTS * WEIGHTS) {
+    if variance >= window.min_variance_of_samples() {
         (1.0 - products / variance.sqrt()).clamp(0.0, MAX_COST)
     } else {
         MAX_COST
@@ -283,8 +289,7 @@ pub fn patch_costs<'a, S: Simd>(
     }
     let (sum, squares, products) = (simd.sums(&sums), simd.sums(&squares), simd.sums(&products));
     let variance = simd.sub(squares, simd.mul(sum, sum));
-    let least =
-        if patch.has_texture(window) { window.min_variance * (WEIGHTS * WEIGHTS) } else { f32::INFINITY };
+    let least = if patch.has_texture(window) { window.min_variance_of_samples() } else { f32::INFINITY };
     let has_texture = simd.at_least(variance, simd.splat(least));
     let ncc = simd.div(products, simd.sqrt(variance));
     let cost = simd.min(simd.max(simd.sub(simd.splat(1.0), ncc), zero), simd.splat(MAX_COST));

@@ -69,8 +69,7 @@ impl State {
             {
                 return Err(Error::argument(name("cost"), cost, "a number of at least 0"));
             }
-            let cost = own.cost.map_or(0.0, |cost| cost[pixel]).into();
-            solution.cost = cost;
+            solution.cost = own.cost.map_or(0.0, |cost| cost[pixel]).into();
             if depth == 0.0 {
                 continue;
             }
@@ -81,7 +80,7 @@ impl State {
             }
             let validated = own.validated.is_none_or(|validated| validated[pixel]);
             let consistent = if validated { steps.options.min_consistent.min(255) as u8 } else { 0 };
-            *solution = Solution { depth, normal: normal.normalize(), cost, consistent, validated };
+            *solution = Solution { depth, normal: normal.normalize(), consistent, validated, ..*solution };
         }
         let verdicts: Vec<(u8, bool)> =
             solutions.iter().map(|solution| (solution.consistent, solution.validated)).collect();

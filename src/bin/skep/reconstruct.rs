@@ -110,9 +110,10 @@ fn write(
 /// they take over the memory that those have freed. Hours of work are not lost where no thread can be started: the
 /// current one does all of it then.
 fn pool(threads: usize) -> Result<rayon::ThreadPool> {
+    let expected = "a number of threads that the system can start";
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.or_else(|_| rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build());
-    pool.map_err(|error| Error::argument("--threads", threads, error.to_string()))
+    pool.map_err(|error| Error::argument("--threads", threads, format!("{expected} ({error})")))
 }
 
 fn report_path(output: &Path) -> PathBuf {
