@@ -2,68 +2,111 @@
 //! Each validated plane is averaged with those that the source views found of the same surface.
 
 use crate::ambc::MIN_FACING;
-use crate::kernels::SlantedPlane;
+use crate::simd::{Level, Simd, Task, dispatch};
 use crate::state::Solution;
-use crate::views::{Reference, Source};
+use crate::views::{Placements, Reference};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Relative difference of inverse depths up to which a source view found the same surface.
+/// Relative difference of inverse depths up to which a source view found the same surface. What it found counts the less
+/// the more it differs, by Tukey's biweight.
 const SAME: f32 = 0.01;
-/// Difference at which what it found counts for 1 / sqrt(e) of the pixel's own.
-const SIGMA: f32 = 0.004;
 
 /// Averages the validated solutions of a view whose sources show theirs; planes that would leave the depth range or turn
 /// away stay.
-pub fn average(reference: &Reference, solutions: &mut [Solution]) {
-    let width = reference.image.width;
-    solutions.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
-        for (x, solution) in row.iter_mut().enumerate().filter(|(_, solution)| solution.validated) {
-            let at = (x as f32, y as f32);
-            let ray = reference.ray(at.0, at.1);
-            let own = 1.0 / solution.depth;
-            let (mut inverse_depth, mut normal, mut weights) = (own, solution.normal, 1.0);
-            for source in &reference.sources {
-                let Some(found) = found_by(source, at, own) else { continue };
-                let off = found.inverse_depth / own - 1.0;
-                if off.abs() < SAME {
-                    let weight = (-off * off / (2.0 * SIGMA * SIGMA)).exp();
-                    inverse_depth += weight * found.inverse_depth;
-                    normal += weight * found.depth_and_normal(ray, reference.inverse_focal).1;
-                    weights += weight;
-                }
-            }
-            let (depth, normal) = (weights / inverse_depth, normal.normalize_or_zero());
-            let is_in_range = depth >= reference.near && depth <= reference.far;
-            if weights > 1.0 && is_in_range && normal.dot(ray) < -MIN_FACING {
-                *solution = Solution { depth, normal, ..*solution };
-            }
-        }
-    });
+pub fn average(level: Level, reference: &Reference, solutions: &mut [Solution]) {
+    dispatch(level, AverageTask { reference, solutions });
 }
 
-/// The plane, about a pixel, that a source view found where the pixel's own solution falls.
-fn found_by(source: &Source, (x, y): (f32, f32), inverse_depth: f32) -> Option<SlantedPlane> {
-    let (pose, start) = (&source.pose, source.pose.at_infinity(x, y));
-    let at = source.project(start + pose.epipole * inverse_depth)?;
-    let (column, row) = ((at.x + 0.5) as usize, (at.y + 0.5) as usize);
-    let plane = source.surface.get(row * source.image.width + column)?;
-    let (slope_x, slope_y) = plane.slopes();
-    // A pixel at inverse depth w is `start + w epipole` in the source view; its inverse depth there is w over the third
-    // coordinate, and on the plane that is linear in the other two over the third.
-    let (column, row) = (column as f32, row as f32);
-    let along = |point: Vec3| {
-        slope_x * (point.x - column * point.z)
-            + slope_y * (point.y - row * point.z)
-            + plane.inverse_depth() * point.z
-    };
-    let scale = 1.0 / (1.0 - along(pose.epipole));
-    let found = SlantedPlane {
-        inverse_depth: along(start) * scale,
-        slope_x: along(pose.infinite[0]) * scale,
-        slope_y: along(pose.infinite[1]) * scale,
-    };
-    (plane.inverse_depth() > 0.0 && found.inverse_depth > 0.0).then_some(found)
+struct AverageTask<'a> {
+    reference: &'a Reference<'a>,
+    solutions: &'a mut [Solution],
+}
+
+impl Task for AverageTask<'_> {
+    type Output = ();
+
+    fn run<S: Simd>(self, simd: S) {
+        let AverageTask { reference, solutions } = self;
+        let rows = solutions.par_chunks_mut(reference.image.width).enumerate();
+        rows.for_each(|(y, row)| {
+            simd.vectorize(
+                #[inline(always)]
+                || {
+                    let mut placements = Placements::of_all(simd, reference);
+                    for (x, solution) in row.iter_mut().enumerate().filter(|(_, own)| own.validated) {
+                        let (x, y) = (x as f32, y as f32);
+                        placements.move_to(x, y);
+                        average_pixel(simd, reference, &placements, reference.ray(x, y), solution);
+                    }
+                },
+            );
+        });
+    }
+}
+
+/// Averages the solution of the pixel at which the sources are placed.
+#[inline(always)]
+fn average_pixel<S: Simd>(
+    simd: S,
+    reference: &Reference,
+    placements: &Placements<'_, S>,
+    ray: Vec3,
+    solution: &mut Solution,
+) {
+    let own = 1.0 / solution.depth;
+    let zero = simd.splat(0.0);
+    let (mut weights, mut inverse_depths, mut normals) = (zero, zero, [zero; 3]);
+    for group in placements.groups() {
+        let placed = group.place(simd, solution.depth);
+        let found = group.found(simd, &placed);
+        let off = simd.sub(simd.mul(found.inverse_depth, simd.splat(solution.depth)), simd.splat(1.0));
+        let share = simd.mul(off, simd.splat(1.0 / SAME));
+        let left = simd.sub(simd.splat(1.0), simd.mul(share, share));
+        let same = placed.inside & found.known & simd.at_least(left, simd.splat(f32::MIN_POSITIVE));
+        if same == 0 {
+            continue;
+        }
+        // Numbers also in the lanes that count for nothing.
+        let weight = simd.select(same, simd.mul(left, left), zero);
+        let inverse_depth = simd.select(same, found.inverse_depth, simd.splat(own));
+        weights = simd.add(weights, weight);
+        inverse_depths = simd.mul_add(weight, inverse_depth, inverse_depths);
+        let slopes = [simd.select(same, found.slope_x, zero), simd.select(same, found.slope_y, zero)];
+        let normal = facing_normals(simd, reference, ray, inverse_depth, slopes);
+        for (sum, axis) in normals.iter_mut().zip(normal) {
+            *sum = simd.mul_add(weight, axis, *sum);
+        }
+    }
+    let weights = 1.0 + simd.sum(weights);
+    let depth = weights / (own + simd.sum(inverse_depths));
+    let [x, y, z] = normals;
+    let normal = solution.normal + Vec3::new(simd.sum(x), simd.sum(y), simd.sum(z));
+    let normal = normal.normalize_or_zero();
+    let is_in_range = depth >= reference.near && depth <= reference.far;
+    if weights > 1.0 && is_in_range && normal.dot(ray) < -MIN_FACING {
+        *solution = Solution { depth, normal, ..*solution };
+    }
+}
+
+/// Unit normals of planes about the pixel of a ray, as [`SlantedPlane::depth_and_normal`](crate::kernels::SlantedPlane::depth_and_normal)
+/// has them.
+#[inline(always)]
+fn facing_normals<S: Simd>(
+    simd: S,
+    reference: &Reference,
+    ray: Vec3,
+    inverse_depth: S::F32,
+    [slope_x, slope_y]: [S::F32; 2],
+) -> [S::F32; 3] {
+    let depth = simd.div(simd.splat(1.0), inverse_depth);
+    // The normals over their products with the ray.
+    let x = simd.mul(simd.mul(slope_x, depth), simd.splat(1.0 / reference.inverse_focal.0));
+    let y = simd.mul(simd.mul(slope_y, depth), simd.splat(1.0 / reference.inverse_focal.1));
+    let z = simd.sub(simd.splat(1.0), simd.mul_add(x, simd.splat(ray.x), simd.mul(y, simd.splat(ray.y))));
+    let square = simd.mul_add(x, x, simd.mul_add(y, y, simd.mul(z, z)));
+    let scale = simd.div(simd.splat(-1.0), simd.sqrt(square));
+    [simd.mul(x, scale), simd.mul(y, scale), simd.mul(z, scale)]
 }
 
 #[cfg(test)]
@@ -106,7 +149,7 @@ mod tests {
     fn exact_depths_stay() {
         let (world, mut solutions) = spoiled(|_, _| 1.0);
         let before = solutions.clone();
-        average(&world.reference(), &mut solutions);
+        average(Level::detect(), &world.reference(), &mut solutions);
         for (solution, before) in solutions.iter().zip(&before) {
             assert!((solution.depth / before.depth - 1.0).abs() < 1e-5, "{solution:?} was {before:?}");
             assert!((solution.normal - before.normal).length() < 3e-3, "{solution:?} was {before:?}");
@@ -119,7 +162,7 @@ mod tests {
     fn errors_of_five_views_average_out() {
         let (world, mut solutions) = spoiled(|_, random| 1.0 + 0.002 * random.signed());
         let before = error(&world, &solutions);
-        average(&world.reference(), &mut solutions);
+        average(Level::detect(), &world.reference(), &mut solutions);
         let after = error(&world, &solutions);
         // One over the square root of five, and what views do not see.
         assert!(after < 0.55 * before, "{before} to {after}");
@@ -130,12 +173,12 @@ mod tests {
         let (world, mut solutions) = spoiled(|view, _| if view > 0 { 1.03 } else { 1.001 });
         solutions[100].validated = false;
         let before = solutions.clone();
-        average(&world.reference(), &mut solutions);
+        average(Level::detect(), &world.reference(), &mut solutions);
         assert_eq!(solutions, before);
         let (nearer, mut solutions) = spoiled(|view, _| if view > 0 { 1.003 } else { 1.0 });
         solutions[100].validated = false;
         let before = solutions.clone();
-        average(&nearer.reference(), &mut solutions);
+        average(Level::detect(), &nearer.reference(), &mut solutions);
         assert_eq!(solutions[100], before[100]);
         assert!(solutions[101].depth > 1.001 * before[101].depth);
     }
@@ -146,7 +189,7 @@ mod tests {
         let before = solutions.clone();
         let mut reference = world.reference();
         reference.far = before.iter().map(|solution| solution.depth).fold(0.0, f32::max);
-        average(&reference, &mut solutions);
+        average(Level::detect(), &reference, &mut solutions);
         assert!(solutions.iter().all(|solution| solution.depth <= reference.far));
         assert!(solutions.iter().zip(&before).any(|(solution, before)| solution == before));
         assert!(solutions.iter().zip(&before).any(|(solution, before)| solution != before));

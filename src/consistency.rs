@@ -4,8 +4,9 @@
 use crate::error::{Error, Result};
 use crate::options::Options;
 use crate::progress::Cancelled;
+use crate::simd::{LANES, Level, Simd, Task, dispatch};
 use crate::state::{Solution, ViewState};
-use crate::views::{Reference, Source};
+use crate::views::{Placements, Reference, ViewSets};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -19,15 +20,13 @@ pub struct ConsistencyRules {
     occluders_abstain: bool,
 }
 
-/// What a source view says of a solution.
+/// How the depths that eight source views found compare with a solution's, as bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
-    /// It found the same surface.
-    Consistent,
-    /// It found another one.
-    Inconsistent,
-    /// It cannot speak: what it found lies in front and may hide the point from it.
-    Abstains,
+pub struct Depths {
+    /// The source views that found the same depth.
+    pub same: u8,
+    /// Those that cannot speak: what they found lies in front and may hide the point from them.
+    pub abstaining: u8,
 }
 
 impl ConsistencyRules {
@@ -47,19 +46,23 @@ impl ConsistencyRules {
         ConsistencyRules { depth_tolerance: 0.5 * self.depth_tolerance, ..self }
     }
 
-    /// Compares a solution, as depth and normal in the source view's frame, with the source view's own.
+    /// Compares the depths of a solution in eight source views' frames with the source views' own, 0 where they have none.
     #[inline(always)]
-    pub fn judge(&self, depth: f32, normal: Vec3, own: &Solution) -> Verdict {
-        let difference = own.depth - depth;
-        if self.occluders_abstain && own.depth > 0.0 && difference < -self.depth_tolerance * depth {
-            return Verdict::Abstains;
+    pub fn compare<S: Simd>(&self, simd: S, depth: S::F32, own: S::F32) -> Depths {
+        let tolerance = simd.mul(simd.splat(self.depth_tolerance), depth);
+        let (behind, before) = (simd.sub(own, depth), simd.sub(depth, own));
+        let known = simd.at_least(own, simd.splat(f32::MIN_POSITIVE));
+        let in_front = known & !simd.at_least(tolerance, before);
+        Depths {
+            same: known & !simd.at_least(behind, tolerance) & !simd.at_least(before, tolerance),
+            abstaining: if self.occluders_abstain { in_front } else { 0 },
         }
-        let same_depth = own.depth > 0.0 && difference.abs() < self.depth_tolerance * depth;
-        if same_depth && normal.dot(own.normal) > self.min_normal_cosine {
-            Verdict::Consistent
-        } else {
-            Verdict::Inconsistent
-        }
+    }
+
+    /// Whether normals in the same frame agree.
+    #[inline(always)]
+    pub fn agree(&self, normal: Vec3, own: Vec3) -> bool {
+        normal.dot(own) > self.min_normal_cosine
     }
 
     /// Whether this many consistent sources out of those that can speak validate a solution.
@@ -76,75 +79,112 @@ impl ConsistencyRules {
 /// # Errors
 /// [`Error::Cancelled`].
 pub fn check(
+    level: Level,
     reference: &Reference,
     state: &ViewState,
     sources: &[Option<&ViewState>],
     rules: &ConsistencyRules,
     cancelled: Cancelled,
 ) -> Result<Vec<(u8, bool)>> {
-    let width = reference.image.width;
-    let judge = |(pixel, solution): (usize, &Solution), met: &mut Vec<Met>| {
-        if solution.depth <= 0.0 {
-            return (0, false);
-        }
-        let at = ((pixel % width) as f32, (pixel / width) as f32);
-        // All are looked up before any is judged: the look-ups, far apart in memory, then do not wait for each other.
-        met.clear();
-        met.extend(state.sets.iter(pixel).filter_map(|index| {
-            sources[index].and_then(|found| meet(&reference.sources[index], found, at, solution))
-        }));
+    let found = sources.iter().map(|found| found.map_or(&[][..], |found| &found.solutions)).collect();
+    dispatch(level, CheckTask { reference, state, found, rules, cancelled })
+}
+
+/// A check, eight sources at a time.
+struct CheckTask<'a> {
+    reference: &'a Reference<'a>,
+    state: &'a ViewState,
+    /// What the sources found, nothing of those that cannot speak.
+    found: Vec<&'a [Solution]>,
+    rules: &'a ConsistencyRules,
+    cancelled: Cancelled<'a>,
+}
+
+/// Rows judged at once, between two looks whether to go on.
+const BAND_ROWS: usize = 8;
+
+impl Task for CheckTask<'_> {
+    type Output = Result<Vec<(u8, bool)>>;
+
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let CheckTask { reference, state, .. } = &self;
+        let width = reference.image.width;
+        let mut verdicts = vec![(0, false); state.solutions.len()];
+        let bands = verdicts.par_chunks_mut(BAND_ROWS * width).enumerate();
+        bands.try_for_each(|(band, verdicts)| {
+            if (self.cancelled)() {
+                return Err(Error::Cancelled);
+            }
+            simd.vectorize(
+                #[inline(always)]
+                || {
+                    let mut placements = Placements::of_all(simd, reference);
+                    for (row, verdicts) in verdicts.chunks_exact_mut(width).enumerate() {
+                        let y = band * BAND_ROWS + row;
+                        for (x, verdict) in verdicts.iter_mut().enumerate() {
+                            let pixel = y * width + x;
+                            let solution = &state.solutions[pixel];
+                            if solution.depth > 0.0 {
+                                placements.move_to(x as f32, y as f32);
+                                *verdict =
+                                    self.judge(simd, &placements, state.sets.words_of(pixel), solution);
+                            }
+                        }
+                    }
+                },
+            );
+            Ok(())
+        })?;
+        Ok(verdicts)
+    }
+}
+
+impl CheckTask<'_> {
+    /// Asks the sources of a set about the solution of the pixel at which they are placed; those whose image it leaves
+    /// abstain.
+    #[inline(always)]
+    fn judge<S: Simd>(
+        &self,
+        simd: S,
+        placements: &Placements<'_, S>,
+        set: &[u32],
+        solution: &Solution,
+    ) -> (u8, bool) {
         let (mut consistent, mut speaking) = (0, 0);
-        for Met { depth, normal, own } in met {
-            match rules.judge(*depth, *normal, own) {
-                Verdict::Consistent => (consistent, speaking) = (consistent + 1, speaking + 1),
-                Verdict::Inconsistent => speaking += 1,
-                Verdict::Abstains => {}
+        for (index, group) in placements.groups().iter().enumerate() {
+            let placed = group.place(simd, solution.depth);
+            let mut asked = placed.inside & ViewSets::eight(set, index);
+            let places = group.nearest_pixels(simd, &placed);
+            // All are looked up before any is judged: the look-ups, far apart in memory, then do not wait for each other.
+            let mut owns = [0.0; LANES];
+            for (lane, (own, found)) in owns.iter_mut().zip(&self.found[index * LANES..]).enumerate() {
+                match found.get(places[lane] as usize) {
+                    Some(found) => *own = found.depth,
+                    None => asked &= !(1 << lane),
+                }
+            }
+            let depth = simd.mul(simd.load(&placed.centre[2]), simd.splat(solution.depth));
+            let Depths { same, abstaining } = self.rules.compare(simd, depth, simd.load(&owns));
+            speaking += (asked & !abstaining).count_ones() as usize;
+            let mut rest = asked & same;
+            while rest != 0 {
+                let lane = rest.trailing_zeros() as usize % LANES;
+                rest &= rest - 1;
+                let source = index * LANES + lane;
+                let normal = self.reference.sources[source].rotation * solution.normal;
+                let own = self.found[source][places[lane] as usize].normal;
+                consistent += usize::from(self.rules.agree(normal, own));
             }
         }
-        (consistent.min(255) as u8, rules.validates(consistent, speaking))
-    };
-    let mut verdicts = vec![(0, false); state.solutions.len()];
-    let bands = verdicts.par_chunks_mut(BAND).zip(state.solutions.par_chunks(BAND)).enumerate();
-    bands.try_for_each(|(band, (verdicts, solutions))| {
-        if cancelled() {
-            return Err(Error::Cancelled);
-        }
-        let mut met = Vec::with_capacity(sources.len());
-        for (verdict, pixel) in verdicts.iter_mut().zip((band * BAND..).zip(solutions)) {
-            *verdict = judge(pixel, &mut met);
-        }
-        Ok(())
-    })?;
-    Ok(verdicts)
-}
-
-/// Pixels judged at once, between two looks whether to go on.
-const BAND: usize = 1 << 12;
-
-/// A solution in a source view's frame, and what that view found there.
-struct Met {
-    depth: f32,
-    normal: Vec3,
-    own: Solution,
-}
-
-/// Looks up what a source view found where a solution falls; `None` outside its image: it abstains.
-fn meet(source: &Source, found: &ViewState, (x, y): (f32, f32), solution: &Solution) -> Option<Met> {
-    let point = source.pose.at_infinity(x, y) + source.pose.epipole / solution.depth;
-    let at = source.project(point)?;
-    let nearest = (at.y + 0.5) as usize * source.image.width + (at.x + 0.5) as usize;
-    Some(Met {
-        depth: point.z * solution.depth,
-        normal: source.rotation * solution.normal,
-        own: found.solutions[nearest],
-    })
+        (consistent.min(255) as u8, self.rules.validates(consistent, speaking))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd::Scalar;
     use crate::testing::World;
-    use crate::views::ViewSets;
 
     fn abstaining(occluders_abstain: bool) -> Options {
         Options {
@@ -157,45 +197,50 @@ mod tests {
         }
     }
 
-    fn own(depth: f32, degrees: f32) -> Solution {
-        let (sine, cosine) = degrees.to_radians().sin_cos();
-        Solution { depth, normal: Vec3::new(sine, 0.0, -cosine), ..Solution::default() }
+    /// How a source view's own depth and the angle between normals compare with a solution at a depth of `scale`.
+    fn compare(rules: &ConsistencyRules, scale: f32, factor: f32, degrees: f32) -> (Depths, bool) {
+        let own = Vec3::new(degrees.to_radians().sin(), 0.0, -degrees.to_radians().cos());
+        let depths = rules.compare(Scalar, [scale; LANES], [scale * factor; LANES]);
+        (depths, rules.agree(Vec3::NEG_Z, own))
     }
+
+    const SAME: Depths = Depths { same: 0xff, abstaining: 0 };
+    const OTHER: Depths = Depths { same: 0, abstaining: 0 };
+    const ABSTAINING: Depths = Depths { same: 0, abstaining: 0xff };
 
     #[test]
     fn a_source_agrees_within_both_tolerances() {
         for rules in [true, false].map(|abstain| ConsistencyRules::new(&abstaining(abstain))) {
             for scale in [4.0, 4000.0] {
-                let judge = |factor, degrees| rules.judge(scale, Vec3::NEG_Z, &own(scale * factor, degrees));
-                assert_eq!(judge(1.0, 0.0), Verdict::Consistent);
-                assert_eq!(judge(1.009, 29.0), Verdict::Consistent);
-                assert_eq!(judge(0.991, -29.0), Verdict::Consistent);
-                assert_eq!(judge(1.011, 0.0), Verdict::Inconsistent);
-                assert_eq!(judge(1.0, 31.0), Verdict::Inconsistent);
-                assert_eq!(judge(1.0, -31.0), Verdict::Inconsistent);
+                let compare = |factor, degrees| compare(&rules, scale, factor, degrees);
+                assert_eq!(compare(1.0, 0.0), (SAME, true));
+                assert_eq!(compare(1.009, 29.0), (SAME, true));
+                assert_eq!(compare(0.991, -29.0), (SAME, true));
+                assert_eq!(compare(1.011, 0.0), (OTHER, true));
+                assert_eq!(compare(1.0, 31.0), (SAME, false));
+                assert_eq!(compare(1.0, -31.0), (SAME, false));
+                // A source without a solution speaks against.
+                assert_eq!(compare(0.0, 0.0), (OTHER, true));
             }
-            // A source without a solution speaks against.
-            assert_eq!(rules.judge(4.0, Vec3::NEG_Z, &Solution::default()), Verdict::Inconsistent);
         }
     }
 
     #[test]
     fn closer_rules_halve_the_tolerance_of_depths() {
         let closer = ConsistencyRules::new(&abstaining(false)).closer();
-        let judge = |factor: f32, degrees| closer.judge(4.0, Vec3::NEG_Z, &own(4.0 * factor, degrees));
-        assert_eq!(judge(1.0049, 29.0), Verdict::Consistent);
-        assert_eq!(judge(1.0051, 0.0), Verdict::Inconsistent);
-        assert_eq!(judge(1.0, 31.0), Verdict::Inconsistent);
+        assert_eq!(compare(&closer, 4.0, 1.0049, 29.0), (SAME, true));
+        assert_eq!(compare(&closer, 4.0, 1.0051, 0.0), (OTHER, true));
+        assert_eq!(compare(&closer, 4.0, 1.0, 31.0), (SAME, false));
     }
 
     #[test]
     fn what_lies_in_front_abstains_or_speaks_against_as_in_the_paper() {
-        for (abstain, verdict) in [(true, Verdict::Abstains), (false, Verdict::Inconsistent)] {
+        for (abstain, in_front) in [(true, ABSTAINING), (false, OTHER)] {
             let rules = ConsistencyRules::new(&abstaining(abstain));
-            assert_eq!(rules.judge(4.0, Vec3::NEG_Z, &own(4.0 * 0.985, 0.0)), verdict);
-            assert_eq!(rules.judge(4.0, Vec3::NEG_Z, &own(1.0, 80.0)), verdict);
+            assert_eq!(compare(&rules, 4.0, 0.985, 0.0).0, in_front);
+            assert_eq!(compare(&rules, 4.0, 0.25, 80.0).0, in_front);
             // What lies behind never abstains.
-            assert_eq!(rules.judge(4.0, Vec3::NEG_Z, &own(5.0, 0.0)), Verdict::Inconsistent);
+            assert_eq!(compare(&rules, 4.0, 1.25, 0.0).0, OTHER);
         }
     }
 
@@ -225,7 +270,8 @@ mod tests {
         }
         let sources: Vec<Option<&ViewState>> = states[1..].iter().map(Some).collect();
         let rules = ConsistencyRules::new(&abstaining(occluders_abstain));
-        let verdicts = check(&world.reference(), &states[0], &sources, &rules, &|| false).unwrap();
+        let verdicts =
+            check(Level::detect(), &world.reference(), &states[0], &sources, &rules, &|| false).unwrap();
         assert_eq!(verdicts.len(), states[0].solutions.len());
         verdicts[14 * 36 + 18]
     }
@@ -256,7 +302,7 @@ mod tests {
         let mut verdicts = |sets: ViewSets| {
             states[0].sets = sets;
             let sources: Vec<Option<&ViewState>> = states[1..].iter().map(Some).collect();
-            check(&world.reference(), &states[0], &sources, &rules, &|| false).unwrap()
+            check(Level::detect(), &world.reference(), &states[0], &sources, &rules, &|| false).unwrap()
         };
         let middle = 14 * 36 + 18;
         assert_eq!(verdicts(one)[middle], (1, false));
@@ -275,7 +321,8 @@ mod tests {
         let sources: Vec<Option<&ViewState>> = states[1..].iter().map(Some).collect();
         let rules = ConsistencyRules::new(&abstaining(true));
         assert_eq!(
-            check(&world.reference(), &states[0], &sources, &rules, &|| false).unwrap()[14 * 36 + 18],
+            check(Level::detect(), &world.reference(), &states[0], &sources, &rules, &|| false).unwrap()
+                [14 * 36 + 18],
             (0, false)
         );
     }

@@ -4,10 +4,11 @@
 use crate::ambc::{MIN_FACING, Offer};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::kernels::RelativePose;
 use crate::progress::Cancelled;
 use crate::scene::DepthRange;
-use crate::state::{Solution, ViewState};
-use glam::{DVec2, DVec3};
+use crate::state::ViewState;
+use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
 /// A view that offers its solutions.
@@ -87,6 +88,7 @@ fn given(
     giver: &Giver,
     first: usize,
 ) -> Vec<(usize, Ranked)> {
+    let pose = RelativePose::new(giver.camera, camera);
     let rotation = camera.rotation * giver.camera.rotation.transpose();
     let translation = camera.translation - rotation * giver.camera.translation;
     let width = giver.camera.width as usize;
@@ -95,12 +97,17 @@ fn given(
         if solution.depth <= 0.0 || solution.consistent == 0 {
             continue;
         }
-        let at = DVec2::new((pixel % width) as f64, (pixel / width) as f64);
-        let point = rotation * (giver.camera.ray(at) * f64::from(solution.depth)) + translation;
+        let (x, y) = (pixel % width, pixel / width);
+        let place = pose.at_infinity(x as f32, y as f32) + pose.epipole / solution.depth;
+        // Most solutions land where another one is validated: what is exact is worked out for the others only.
+        let Some(target) = nearest_pixel(camera, place).filter(|&target| !state.solutions[target].validated)
+        else {
+            continue;
+        };
+        let ray = giver.camera.ray(DVec2::new(x as f64, y as f64));
+        let point = rotation * (ray * f64::from(solution.depth)) + translation;
         let normal = rotation * solution.normal.as_dvec3();
-        if let Some((target, depth)) = land(camera, point, normal, range)
-            && !is_settled(&state.solutions[target])
-        {
+        if let Some(depth) = depth_at(camera, target, point, normal, range) {
             let offer = Offer { depth, normal: normal.as_vec3(), cost: solution.cost.into() };
             offers.push((target, Ranked { offer, view: giver.view }));
         }
@@ -109,26 +116,29 @@ fn given(
     offers
 }
 
-fn is_settled(solution: &Solution) -> bool {
-    solution.validated
+/// The pixel a homogeneous point falls on, `None` behind the camera or outside its image.
+fn nearest_pixel(camera: &Camera, point: Vec3) -> Option<usize> {
+    let (x, y) = (point.x / point.z + 0.5, point.y / point.z + 0.5);
+    let is_inside =
+        point.z > 0.0 && x >= 0.0 && y >= 0.0 && x < camera.width as f32 && y < camera.height as f32;
+    is_inside.then(|| y as usize * camera.width as usize + x as usize)
 }
 
-/// The pixel a point of the target's frame falls on and the depth of its plane exactly there.
-fn land(camera: &Camera, point: DVec3, normal: DVec3, range: DepthRange) -> Option<(usize, f32)> {
-    let (x, y) = camera.nearest_pixel(camera.project_camera(point)?)?;
-    let ray = camera.ray(DVec2::new(f64::from(x), f64::from(y)));
+/// The depth of a plane, through a point of the target's frame, exactly at a pixel.
+fn depth_at(camera: &Camera, pixel: usize, point: DVec3, normal: DVec3, range: DepthRange) -> Option<f32> {
+    let width = camera.width as usize;
+    let ray = camera.ray(DVec2::new((pixel % width) as f64, (pixel / width) as f64));
     let facing = normal.dot(ray);
     let depth = normal.dot(point) / facing;
     let is_usable = facing < -f64::from(MIN_FACING) && depth >= range.near && depth <= range.far;
-    is_usable.then_some((y as usize * camera.width as usize + x as usize, depth as f32))
+    is_usable.then_some(depth as f32)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::state::ShortCost;
+    use crate::state::{ShortCost, Solution};
     use crate::testing::{self, RANGE, World};
-    use glam::Vec3;
 
     /// A world, its target's state, and the exact states of the others.
     fn target_and_givers() -> (World, ViewState, Vec<ViewState>) {

@@ -60,19 +60,12 @@ impl CostRules {
 
     /// What a hypothesis of this depth costs in the views of a group by disagreeing with their validated depths.
     #[inline(always)]
-    fn geometric_costs<S: Simd>(
-        &self,
-        simd: S,
-        reference: &Reference,
-        group: &Group,
-        placed: &Placed,
-        depth: f32,
-    ) -> Lanes {
+    fn geometric_costs<S: Simd>(&self, simd: S, group: &Group, placed: &Placed, depth: f32) -> Lanes {
         let GeometricRules { weight, limit, unknown } = self.geometric;
         if weight == 0.0 {
             return [0.0; LANES];
         }
-        let surfaces = group.surfaces(simd, reference, placed);
+        let surfaces = group.surfaces(simd, placed);
         let depth_there = simd.mul(simd.splat(depth), simd.load(&placed.centre[2]));
         let one = simd.splat(1.0);
         let difference = simd.sub(simd.mul(depth_there, simd.load(&surfaces.exact)), one);
@@ -93,7 +86,7 @@ pub struct Evaluator<'a, S: Simd> {
     is_weak: bool,
     ray: Vec3,
     grey: u8,
-    placements: Placements<S>,
+    placements: Placements<'a, S>,
     /// One for each group of the pixel's views.
     views: Vec<InViews>,
     surroundings: Surroundings,
@@ -281,11 +274,11 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     /// Finds where a hypothesis falls in the views of the set. A view whose image its centre leaves does not count.
     #[inline(always)]
     fn place(&mut self, food: &FoodSource) {
-        let Evaluator { simd, placements, views, reference, rules, .. } = self;
+        let Evaluator { simd, placements, views, rules, .. } = self;
         views.clear();
         for group in placements.groups() {
             let placed = group.place(*simd, food.depth);
-            let least = rules.geometric_costs(*simd, reference, group, &placed, food.depth);
+            let least = rules.geometric_costs(*simd, group, &placed, food.depth);
             views.push(InViews { placed, least });
         }
     }

@@ -44,7 +44,7 @@ impl Steps {
     fn averaged(&self, own: &State, reference: &Reference) -> Vec<Solution> {
         let mut solutions = own.solved.solutions.clone();
         if self.options.average_views {
-            average(reference, &mut solutions);
+            average(self.level, reference, &mut solutions);
         }
         solutions
     }
@@ -71,7 +71,8 @@ impl Steps {
         let sources = self.found_by_sources(view, states);
         // What is offered has no cost of its own that speaks for it: the sources must agree more closely.
         let rules = ConsistencyRules::new(&self.options).closer();
-        let verdicts = consistency::check(&reference, &offered, &sources, &rules, &|| advance(0))?;
+        let verdicts =
+            consistency::check(self.level, &reference, &offered, &sources, &rules, &|| advance(0))?;
         let closed =
             (0u32..).zip(offered.solutions.iter().zip(verdicts)).filter(|(_, (_, verdict))| verdict.1);
         let closed = closed.map(|(pixel, (&offer, (consistent, validated)))| {

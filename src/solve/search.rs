@@ -222,7 +222,7 @@ impl Steps {
         let reference = self.reference(step, view, &|view| surface_of(states, view));
         let sources = self.found_by_sources(view, states);
         let rules = ConsistencyRules::new(&self.options);
-        Ok(Verdicts(consistency::check(&reference, &own.solved, &sources, &rules, cancelled)?))
+        Ok(Verdicts(consistency::check(self.level, &reference, &own.solved, &sources, &rules, cancelled)?))
     }
 
     /// What each source view of a view found, `None` of one without a state.

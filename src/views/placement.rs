@@ -1,18 +1,19 @@
 //! Where a pixel's hypothesis falls in its source views, eight views at a time.
 
-use super::{Reference, Source};
+use super::{Reference, ShownPlane, Source, ViewSets};
 use crate::kernels::{PatchHomography, SlantedPlane};
 use crate::simd::{LANES, Simd};
 use glam::Vec3;
+use std::array::from_fn;
 
 type Lanes = [f32; LANES];
 
 /// The source views of a pixel's view set, and where the pixel lies in them for any depth.
 #[derive(Debug, Clone)]
-pub struct Placements<S: Simd> {
+pub struct Placements<'a, S: Simd> {
     simd: S,
-    views: Vec<Fixed>,
-    groups: Vec<Group>,
+    views: Vec<Fixed<'a>>,
+    groups: Vec<Group<'a>>,
     /// Groups that hold the views of the set.
     used: usize,
     /// The set they are the views of.
@@ -22,7 +23,7 @@ pub struct Placements<S: Simd> {
 
 /// What of a source view does not depend on the pixel.
 #[derive(Debug, Clone, Copy)]
-struct Fixed {
+struct Fixed<'a> {
     /// Columns of `K'R K^-1`.
     infinite: [Vec3; 3],
     /// `K't`.
@@ -30,11 +31,13 @@ struct Fixed {
     /// The last column and row of the image.
     corner: [f32; 2],
     width: i32,
+    /// Its validated solutions.
+    surface: &'a [ShownPlane],
 }
 
 /// Up to eight source views, one a lane.
 #[derive(Debug, Clone)]
-pub struct Group {
+pub struct Group<'a> {
     count: usize,
     sources: [usize; LANES],
     infinite: [[Lanes; 3]; 3],
@@ -43,6 +46,8 @@ pub struct Group {
     corner: [Lanes; 2],
     /// Pixels of a row of the image.
     width: [i32; LANES],
+    /// The views' validated solutions.
+    surfaces: [&'a [ShownPlane]; LANES],
     /// `K'R K^-1 [x y 1]` of the pixel at work.
     at_infinity: [Lanes; 3],
 }
@@ -60,6 +65,39 @@ pub struct Placed {
     pub inside: u8,
 }
 
+/// The pixels of a group's views that are nearest to where a hypothesis falls.
+#[derive(Debug, Clone, Copy)]
+struct Nearest<S: Simd> {
+    column: S::F32,
+    row: S::F32,
+    /// Their places in their images.
+    places: [u32; LANES],
+}
+
+/// Validated planes of the views of a group, as each view shows its own: inverse depth at a pixel, 0 where there is none,
+/// and slopes.
+#[derive(Debug, Clone, Copy)]
+struct Shown<S: Simd> {
+    inverse_depth: S::F32,
+    slope_x: S::F32,
+    slope_y: S::F32,
+    /// The lanes whose view has one, as bits.
+    known: u8,
+}
+
+/// The planes that the views of a group found where a hypothesis falls, about the reference view's pixel.
+#[derive(Debug, Clone, Copy)]
+pub struct Found<S: Simd> {
+    /// Inverse depths at the pixel.
+    pub inverse_depth: S::F32,
+    /// Their change per pixel along x.
+    pub slope_x: S::F32,
+    /// Their change per pixel along y.
+    pub slope_y: S::F32,
+    /// The lanes whose view found a plane, as bits; the others hold no plane.
+    pub known: u8,
+}
+
 /// The validated surfaces of the views of a group where a hypothesis falls.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Surfaces {
@@ -71,18 +109,28 @@ pub struct Surfaces {
     pub known: u8,
 }
 
-impl<S: Simd> Placements<S> {
+impl<'a, S: Simd> Placements<'a, S> {
     /// The sources of a reference view, none of them taken yet.
-    pub fn new(simd: S, reference: &Reference) -> Placements<S> {
-        let fixed = |source: &Source| Fixed {
+    pub fn new(simd: S, reference: &Reference<'a>) -> Placements<'a, S> {
+        let fixed = |source: &Source<'a>| Fixed {
             infinite: source.pose.infinite,
             epipole: source.pose.epipole,
             corner: [(source.image.width - 1) as f32, (source.image.height - 1) as f32],
             width: source.image.width as i32,
+            surface: source.surface,
         };
         let views: Vec<Fixed> = reference.sources.iter().map(fixed).collect();
         let groups = vec![Group::new(); views.len().div_ceil(LANES)];
         Placements { simd, views, groups, used: 0, set: Vec::new(), pixel: (0.0, 0.0) }
+    }
+
+    /// All sources of a reference view, at no pixel yet.
+    pub fn of_all(simd: S, reference: &Reference<'a>) -> Placements<'a, S> {
+        let mut placements = Placements::new(simd, reference);
+        let mut all = vec![0; reference.sources.len().div_ceil(32)];
+        ViewSets::fill_words(&mut all, reference.sources.len());
+        placements.go_to(0.0, 0.0, &all);
+        placements
     }
 
     /// Goes to a pixel and takes the source views of its set.
@@ -129,13 +177,13 @@ impl<S: Simd> Placements<S> {
 
     /// The views of the set, in their order.
     #[inline(always)]
-    pub fn groups(&self) -> &[Group] {
+    pub fn groups(&self) -> &[Group<'a>] {
         &self.groups[..self.used]
     }
 }
 
-impl Group {
-    fn new() -> Group {
+impl<'a> Group<'a> {
+    fn new() -> Group<'a> {
         let zeros = [0.0; LANES];
         Group {
             count: 0,
@@ -144,12 +192,13 @@ impl Group {
             epipole: [zeros; 3],
             corner: [zeros; 2],
             width: [0; LANES],
+            surfaces: [&[]; LANES],
             at_infinity: [zeros; 3],
         }
     }
 
     #[inline(always)]
-    fn take(&mut self, lane: usize, source: usize, view: &Fixed) {
+    fn take(&mut self, lane: usize, source: usize, view: &Fixed<'a>) {
         self.sources[lane] = source;
         for axis in 0..3 {
             for column in 0..3 {
@@ -160,6 +209,7 @@ impl Group {
         self.corner[0][lane] = view.corner[0];
         self.corner[1][lane] = view.corner[1];
         self.width[lane] = view.width;
+        self.surfaces[lane] = view.surface;
     }
 
     /// Empties the lanes from this one on.
@@ -169,6 +219,7 @@ impl Group {
         for lane in count..LANES {
             self.corner[0][lane] = -1.0;
             self.corner[1][lane] = -1.0;
+            self.surfaces[lane] = &[];
         }
     }
 
@@ -214,26 +265,60 @@ impl Group {
     /// The validated planes of the views at the pixels nearest to where a hypothesis falls, and what their inverse depths
     /// are exactly there.
     #[inline(always)]
-    pub fn surfaces<S: Simd>(&self, simd: S, reference: &Reference, placed: &Placed) -> Surfaces {
-        let (column, row) = (simd.load(&placed.column), simd.load(&placed.row));
-        let half = simd.splat(0.5);
-        let nearest_column = simd.whole(simd.add(column, half));
-        let nearest_row = simd.whole(simd.add(row, half));
-        let places = simd.places(&self.width, nearest_column, nearest_row);
-        let zeros = [0.0; LANES];
-        let (mut nearest, mut slope_x, mut slope_y) = (zeros, zeros, zeros);
-        for (lane, &source) in self.sources().iter().enumerate() {
-            if let Some(plane) = reference.sources[source].surface.get(places[lane] as usize) {
-                nearest[lane] = plane.inverse_depth();
-                (slope_x[lane], slope_y[lane]) = plane.slopes();
-            }
-        }
-        let across = simd.mul(simd.load(&slope_x), simd.sub(column, nearest_column));
-        let down = simd.mul(simd.load(&slope_y), simd.sub(row, nearest_row));
-        let inverse_depth = simd.load(&nearest);
+    pub fn surfaces<S: Simd>(&self, simd: S, placed: &Placed) -> Surfaces {
+        let nearest = self.nearest(simd, placed);
+        let Shown { inverse_depth, slope_x, slope_y, known } = self.shown(simd, &nearest);
+        let across = simd.mul(slope_x, simd.sub(simd.load(&placed.column), nearest.column));
+        let down = simd.mul(slope_y, simd.sub(simd.load(&placed.row), nearest.row));
         Surfaces {
-            nearest,
+            nearest: simd.store(inverse_depth),
             exact: simd.store(simd.add(simd.add(inverse_depth, across), down)),
+            known,
+        }
+    }
+
+    /// The planes that the views found where a hypothesis falls.
+    #[inline(always)]
+    pub fn found<S: Simd>(&self, simd: S, placed: &Placed) -> Found<S> {
+        let nearest = self.nearest(simd, placed);
+        let shown = self.shown(simd, &nearest);
+        // A pixel at inverse depth w is `at_infinity + w epipole` in the source view; its inverse depth there is w over
+        // the third coordinate, and on the plane that is linear in the other two over the third.
+        let one = simd.splat(1.0);
+        let scale = simd.div(one, simd.sub(one, along(simd, &shown, &nearest, &self.epipole)));
+        let inverse_depth = simd.mul(along(simd, &shown, &nearest, &self.at_infinity), scale);
+        Found {
+            inverse_depth,
+            slope_x: simd.mul(along(simd, &shown, &nearest, &self.infinite[0]), scale),
+            slope_y: simd.mul(along(simd, &shown, &nearest, &self.infinite[1]), scale),
+            known: shown.known & simd.at_least(inverse_depth, simd.splat(f32::MIN_POSITIVE)),
+        }
+    }
+
+    /// The places in their images of the views' pixels nearest to where a hypothesis falls.
+    #[inline(always)]
+    pub fn nearest_pixels<S: Simd>(&self, simd: S, placed: &Placed) -> [u32; LANES] {
+        self.nearest(simd, placed).places
+    }
+
+    #[inline(always)]
+    fn nearest<S: Simd>(&self, simd: S, placed: &Placed) -> Nearest<S> {
+        let half = simd.splat(0.5);
+        let column = simd.whole(simd.add(simd.load(&placed.column), half));
+        let row = simd.whole(simd.add(simd.load(&placed.row), half));
+        Nearest { column, row, places: simd.places(&self.width, column, row) }
+    }
+
+    #[inline(always)]
+    fn shown<S: Simd>(&self, simd: S, nearest: &Nearest<S>) -> Shown<S> {
+        let planes: [ShownPlane; LANES] = from_fn(|lane| {
+            self.surfaces[lane].get(nearest.places[lane] as usize).copied().unwrap_or_default()
+        });
+        let inverse_depth = simd.load(&planes.map(|plane| plane.inverse_depth()));
+        Shown {
+            inverse_depth,
+            slope_x: simd.load(&planes.map(|plane| plane.slopes().0)),
+            slope_y: simd.load(&planes.map(|plane| plane.slopes().1)),
             known: simd.at_least(inverse_depth, simd.splat(f32::MIN_POSITIVE)),
         }
     }
@@ -259,6 +344,17 @@ impl Group {
         }
         slopes
     }
+}
+
+/// What the planes shown about the nearest pixels make of homogeneous points of the views: the inverse depth on the plane
+/// where a point falls, times the point's third coordinate.
+#[inline(always)]
+fn along<S: Simd>(simd: S, shown: &Shown<S>, nearest: &Nearest<S>, [x, y, z]: &[Lanes; 3]) -> S::F32 {
+    let (x, y, z) = (simd.load(x), simd.load(y), simd.load(z));
+    let across = simd.sub(x, simd.mul(nearest.column, z));
+    let down = simd.sub(y, simd.mul(nearest.row, z));
+    let at_pixel = simd.mul(shown.inverse_depth, z);
+    simd.mul_add(shown.slope_x, across, simd.mul_add(shown.slope_y, down, at_pixel))
 }
 
 impl Placed {

@@ -76,7 +76,7 @@ pub struct ViewSelector<'a, S: Simd> {
     reference: &'a Reference<'a>,
     rules: ViewRules,
     /// Of all sources.
-    placements: Placements<S>,
+    placements: Placements<'a, S>,
     /// Centres of projection of the sources of each group, in the reference camera's frame.
     centres: Vec<[Lanes; 3]>,
 }
@@ -84,16 +84,12 @@ pub struct ViewSelector<'a, S: Simd> {
 impl<'a, S: Simd> ViewSelector<'a, S> {
     /// A selector for the pixels of a view.
     pub fn new(simd: S, reference: &'a Reference<'a>, rules: ViewRules) -> ViewSelector<'a, S> {
-        let mut placements = Placements::new(simd, reference);
-        let mut all = vec![0; reference.sources.len().div_ceil(32)];
-        ViewSets::fill_words(&mut all, reference.sources.len());
-        placements.go_to(0.0, 0.0, &all);
         let lanes = |sources: &[Source], axis: usize| -> Lanes {
             std::array::from_fn(|lane| sources.get(lane).map_or(0.0, |source| source.centre[axis]))
         };
         let centres = |sources: &[Source]| std::array::from_fn(|axis| lanes(sources, axis));
         let centres = reference.sources.chunks(LANES).map(centres).collect();
-        ViewSelector { simd, reference, rules, placements, centres }
+        ViewSelector { simd, reference, rules, placements: Placements::of_all(simd, reference), centres }
     }
 
     /// Puts into `set` the source views that see the solution of a pixel: inside the image and, with view selection,
@@ -111,11 +107,11 @@ impl<'a, S: Simd> ViewSelector<'a, S> {
             if rules.enabled {
                 let centres = [simd.load(&centres[0]), simd.load(&centres[1]), simd.load(&centres[2])];
                 seen &= faces_sources(*simd, point, normal, &centres, rules.min_cosine);
-                let Surfaces { nearest, .. } = group.surfaces(*simd, reference, &placed);
+                let Surfaces { nearest, .. } = group.surfaces(*simd, &placed);
                 let depth = simd.mul(simd.load(&placed.centre[2]), simd.splat(depth));
                 seen &= !are_occluded(*simd, depth, simd.load(&nearest), rules.occlusion_margin);
             }
-            set[index * LANES / 32] |= u32::from(seen) << (index * LANES % 32);
+            ViewSets::insert_eight(set, index, seen);
             kept += seen.count_ones() as usize;
         }
         if kept < rules.min_views {

@@ -78,6 +78,18 @@ impl ViewSets {
         words[source / 32] |= 1 << (source % 32);
     }
 
+    /// Adds, of the sources from place `8 index` on, those whose bits are set.
+    #[inline(always)]
+    pub(crate) fn insert_eight(words: &mut [u32], index: usize, bits: u8) {
+        words[index / 4] |= u32::from(bits) << (index % 4 * 8);
+    }
+
+    /// The eight sources from place `8 index` on, as bits.
+    #[inline(always)]
+    pub(crate) fn eight(words: &[u32], index: usize) -> u8 {
+        (words[index / 4] >> (index % 4 * 8)) as u8
+    }
+
     #[inline(always)]
     pub(crate) fn holds(words: &[u32], source: usize) -> bool {
         words[source / 32] >> (source % 32) & 1 != 0

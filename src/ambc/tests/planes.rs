@@ -61,7 +61,7 @@ fn a_validated_plane_shown_by_a_source_is_the_wall_between_its_pixels_too() {
     let mut at = group.place(Scalar, 5.0);
     at.column[..2].fill(10.4);
     at.row[..2].fill(7.7);
-    let shown = group.surfaces(Scalar, &reference, &at);
+    let shown = group.surfaces(Scalar, &at);
     assert_eq!(shown.nearest[0], world.surfaces[1][8 * 36 + 10].inverse_depth());
     assert_eq!(shown.known, 0b01);
     let camera = &world.cameras[1];
