@@ -5,7 +5,6 @@ use super::warp::Warp;
 use crate::image::PackedImage;
 use crate::simd::{LANES, Simd, WEIGHTS};
 use std::array::from_fn;
-use std::slice::from_ref;
 
 /// The cost of patches that cannot be compared, and the highest there is.
 pub const MAX_COST: f32 = 2.0;
@@ -275,26 +274,103 @@ pub fn patch_costs<'a, S: Simd>(
     simd: S,
     window: &Window,
     patch: &ReferencePatch,
-    mut view: impl FnMut(usize) -> (&'a PackedImage, PatchHomography),
+    view: impl FnMut(usize) -> (&'a PackedImage, PatchHomography),
     wanted: u8,
 ) -> [f32; LANES] {
-    let zero = simd.splat(0.0);
-    let (mut sums, mut squares, mut products) = ([zero; LANES], [zero; LANES], [zero; LANES]);
+    // The loops over the vectors of the usual windows of 16 and 24 samples are rolled out.
+    let sums = match (&window.mirrored[..], &window.rest[..]) {
+        ([_], []) => correlate_views::<S, 2>(simd, window, patch, view, wanted),
+        ([_], [_]) => correlate_views::<S, 3>(simd, window, patch, view, wanted),
+        ([_, _], [_]) => correlate_views::<S, 5>(simd, window, patch, view, wanted),
+        _ => correlate_views_in_turn(simd, window, patch, view, wanted),
+    };
+    let [sum, squares, products] = [simd.sums(&sums[0]), simd.sums(&sums[1]), simd.sums(&sums[2])];
+    let variance = simd.sub(squares, simd.mul(sum, sum));
+    let least = if patch.has_texture(window) { window.min_variance_of_samples() } else { f32::INFINITY };
+    let has_texture = simd.at_least(variance, simd.splat(least));
+    let ncc = simd.div(products, simd.sqrt(variance));
+    let cost = simd.max(simd.sub(simd.splat(1.0), ncc), simd.splat(0.0));
+    let cost = simd.store(simd.min(cost, simd.splat(MAX_COST)));
+    from_fn(|lane| if has_texture >> lane & 1 != 0 { cost[lane] } else { MAX_COST })
+}
+
+/// The sums of [`correlate`] of the wanted views, a vector each.
+type SumsOfViews<S> = [[<S as Simd>::F32; LANES]; 3];
+
+#[inline(always)]
+fn correlate_views_in_turn<'a, S: Simd>(
+    simd: S,
+    window: &Window,
+    patch: &ReferencePatch,
+    mut view: impl FnMut(usize) -> (&'a PackedImage, PatchHomography),
+    wanted: u8,
+) -> SumsOfViews<S> {
+    let mut sums = [[simd.splat(0.0); LANES]; 3];
     let mut rest = wanted;
     while rest != 0 {
         let lane = rest.trailing_zeros() as usize % LANES;
         rest &= rest - 1;
         let (source, homography) = view(lane);
-        [sums[lane], squares[lane], products[lane]] = correlate(simd, window, patch, source, &homography);
+        [sums[0][lane], sums[1][lane], sums[2][lane]] = correlate(simd, window, patch, source, &homography);
     }
-    let (sum, squares, products) = (simd.sums(&sums), simd.sums(&squares), simd.sums(&products));
-    let variance = simd.sub(squares, simd.mul(sum, sum));
-    let least = if patch.has_texture(window) { window.min_variance_of_samples() } else { f32::INFINITY };
-    let has_texture = simd.at_least(variance, simd.splat(least));
-    let ncc = simd.div(products, simd.sqrt(variance));
-    let cost = simd.min(simd.max(simd.sub(simd.splat(1.0), ncc), zero), simd.splat(MAX_COST));
-    let cost = simd.store(cost);
-    from_fn(|lane| if has_texture >> lane & 1 != 0 { cost[lane] } else { MAX_COST })
+    sums
+}
+
+/// The same for a window of a mirrored pair and up to one vector more, `N` in all. While a view's samples are added up,
+/// the next one's places are worked out: each waits for steps that take long.
+#[inline(always)]
+fn correlate_views<'a, S: Simd, const N: usize>(
+    simd: S,
+    window: &Window,
+    patch: &ReferencePatch,
+    mut view: impl FnMut(usize) -> (&'a PackedImage, PatchHomography),
+    wanted: u8,
+) -> SumsOfViews<S> {
+    let mut sums = [[simd.splat(0.0); LANES]; 3];
+    if wanted == 0 {
+        return sums;
+    }
+    let mut lane = wanted.trailing_zeros() as usize % LANES;
+    let mut rest = wanted & (wanted - 1);
+    let (source, homography) = view(lane);
+    let mut aimed: [S::Aimed<'a>; N] = aim(simd, window, &Warp::new(simd, source, &homography));
+    while rest != 0 {
+        let next_lane = rest.trailing_zeros() as usize % LANES;
+        rest &= rest - 1;
+        let (source, homography) = view(next_lane);
+        let next = aim(simd, window, &Warp::new(simd, source, &homography));
+        [sums[0][lane], sums[1][lane], sums[2][lane]] = add_up(simd, patch, aimed);
+        (aimed, lane) = (next, next_lane);
+    }
+    [sums[0][lane], sums[1][lane], sums[2][lane]] = add_up(simd, patch, aimed);
+    sums
+}
+
+/// The places of the `N` vectors of a window of mirrored pairs and up to one vector more.
+#[inline(always)]
+fn aim<'a, S: Simd, const N: usize>(simd: S, window: &Window, warp: &Warp<'a, S>) -> [S::Aimed<'a>; N] {
+    let mut all = [warp.aim_at_centre(simd); N];
+    for (index, [offsets, _]) in window.mirrored[..N / 2].iter().enumerate() {
+        let both = warp.aim_mirrored(simd, simd.load(&offsets.x), simd.load(&offsets.y));
+        [all[2 * index], all[2 * index + 1]] = both;
+    }
+    if N % 2 == 1 {
+        let offsets = &window.rest[0];
+        all[N - 1] = warp.aim(simd, simd.load(&offsets.x), simd.load(&offsets.y));
+    }
+    all
+}
+
+/// The sums of [`correlate`] over the samples at these places.
+#[inline(always)]
+fn add_up<S: Simd, const N: usize>(simd: S, patch: &ReferencePatch, aimed: [S::Aimed<'_>; N]) -> [S::F32; 3] {
+    let mean = simd.splat(patch.mean * WEIGHTS);
+    let mut sums = [simd.splat(0.0); 3];
+    for index in 0..N {
+        let side = (&patch.weights[index], &patch.weighted[index]);
+        sums = add(simd, sums, side, simd.sub(simd.read(aimed[index]), mean));
+    }
+    sums
 }
 
 /// The weighted sums over a patch's image in a source view, eight samples a vector: of the differences to the
@@ -308,12 +384,11 @@ fn correlate<S: Simd>(
     homography: &PatchHomography,
 ) -> [S::F32; 3] {
     let warp = Warp::new(simd, source, homography);
-    let (pairs, rest) = (&window.mirrored[..], &window.rest[..]);
-    // The loops over the vectors of the usual windows of 16 and 24 samples are rolled out.
-    match (pairs, rest) {
-        ([pair], []) => correlate_vectors(simd, from_ref(pair), &[], patch, &warp),
-        ([pair], [last]) => correlate_vectors(simd, from_ref(pair), from_ref(last), patch, &warp),
-        _ => correlate_vectors(simd, pairs, rest, patch, &warp),
+    match (&window.mirrored[..], &window.rest[..]) {
+        ([_], []) => add_up::<S, 2>(simd, patch, aim(simd, window, &warp)),
+        ([_], [_]) => add_up::<S, 3>(simd, patch, aim(simd, window, &warp)),
+        ([_, _], [_]) => add_up::<S, 5>(simd, patch, aim(simd, window, &warp)),
+        (pairs, rest) => correlate_vectors(simd, pairs, rest, patch, &warp),
     }
 }
 
@@ -329,14 +404,14 @@ fn correlate_vectors<S: Simd>(
     let mut sums = [simd.splat(0.0); 3];
     let mut sides = patch.weights.iter().zip(&patch.weighted);
     for [offsets, _] in pairs {
-        let both = warp.sample_mirrored(simd, simd.load(&offsets.x), simd.load(&offsets.y));
-        for (grey, side) in both.into_iter().zip(&mut sides) {
-            sums = add(simd, sums, side, simd.sub(grey, mean));
+        let both = warp.aim_mirrored(simd, simd.load(&offsets.x), simd.load(&offsets.y));
+        for (aimed, side) in both.into_iter().zip(&mut sides) {
+            sums = add(simd, sums, side, simd.sub(simd.read(aimed), mean));
         }
     }
     for (offsets, side) in rest.iter().zip(sides) {
-        let grey = warp.sample(simd, simd.load(&offsets.x), simd.load(&offsets.y));
-        sums = add(simd, sums, side, simd.sub(grey, mean));
+        let aimed = warp.aim(simd, simd.load(&offsets.x), simd.load(&offsets.y));
+        sums = add(simd, sums, side, simd.sub(simd.read(aimed), mean));
     }
     sums
 }

@@ -25,30 +25,36 @@ impl<'a, S: Simd> Warp<'a, S> {
         }
     }
 
-    /// The [`Simd::bilinear`] samples at these offsets from the pixel; on the source camera's plane one at the border.
+    /// Aims at these offsets from the pixel; on the source camera's plane at the border.
     #[inline(always)]
-    pub fn sample(&self, simd: S, dx: S::F32, dy: S::F32) -> S::F32 {
+    pub fn aim(&self, simd: S, dx: S::F32, dy: S::F32) -> S::Aimed<'a> {
         let [x, y, z] = self.centre;
         let [step_x, step_y, step_z] = self.step(simd, dx, dy);
-        self.read(simd, [simd.add(x, step_x), simd.add(y, step_y), simd.add(z, step_z)])
+        self.aim_at(simd, [simd.add(x, step_x), simd.add(y, step_y), simd.add(z, step_z)])
     }
 
-    /// The samples at these offsets and at their opposites.
+    /// Aims at these offsets and at their opposites.
     #[inline(always)]
-    pub fn sample_mirrored(&self, simd: S, dx: S::F32, dy: S::F32) -> [S::F32; 2] {
+    pub fn aim_mirrored(&self, simd: S, dx: S::F32, dy: S::F32) -> [S::Aimed<'a>; 2] {
         let [x, y, z] = self.centre;
         let [step_x, step_y, step_z] = self.step(simd, dx, dy);
         [
-            self.read(simd, [simd.add(x, step_x), simd.add(y, step_y), simd.add(z, step_z)]),
-            self.read(simd, [simd.sub(x, step_x), simd.sub(y, step_y), simd.sub(z, step_z)]),
+            self.aim_at(simd, [simd.add(x, step_x), simd.add(y, step_y), simd.add(z, step_z)]),
+            self.aim_at(simd, [simd.sub(x, step_x), simd.sub(y, step_y), simd.sub(z, step_z)]),
         ]
     }
 
-    /// The samples at homogeneous places.
+    /// Aims at the pixel itself.
     #[inline(always)]
-    fn read(&self, simd: S, [x, y, z]: [S::F32; 3]) -> S::F32 {
+    pub fn aim_at_centre(&self, simd: S) -> S::Aimed<'a> {
+        self.aim_at(simd, self.centre)
+    }
+
+    /// Aims at homogeneous places.
+    #[inline(always)]
+    fn aim_at(&self, simd: S, [x, y, z]: [S::F32; 3]) -> S::Aimed<'a> {
         let parts_per_z = simd.div(simd.splat(PARTS), z);
-        simd.bilinear(self.source, simd.mul(x, parts_per_z), simd.mul(y, parts_per_z))
+        simd.aim(self.source, simd.mul(x, parts_per_z), simd.mul(y, parts_per_z))
     }
 
     /// How far the homogeneous coordinates of the samples are from the pixel's.

@@ -8,9 +8,18 @@ use wide::f32x8;
 #[derive(Debug, Clone, Copy)]
 pub struct Base;
 
+/// Places in an image, in whole 256ths of a pixel.
+#[derive(Debug, Clone, Copy)]
+pub struct Aimed<'a> {
+    image: &'a Taps,
+    x: f32x8,
+    y: f32x8,
+}
+
 impl Simd for Base {
     const LEVEL: Level = Level::Base;
     type F32 = f32x8;
+    type Aimed<'a> = Aimed<'a>;
 
     #[inline(always)]
     fn splat(self, value: f32) -> f32x8 {
@@ -77,13 +86,18 @@ impl Simd for Base {
         Scalar.places(strides, x.to_array(), y.to_array())
     }
 
-    // `wide` has no gather: lanes are read one by one. Samples are whole and below 2^24, so f32 holds them exactly in
-    // whatever order they are worked out.
     #[inline(always)]
-    fn bilinear(self, image: &Taps, x: f32x8, y: f32x8) -> f32x8 {
+    fn aim<'a>(self, image: &'a Taps, x: f32x8, y: f32x8) -> Aimed<'a> {
         let (right, bottom) = image.last();
         let x = self.min(self.max(x, f32x8::ZERO), f32x8::splat(right)).trunc();
         let y = self.min(self.max(y, f32x8::ZERO), f32x8::splat(bottom)).trunc();
+        Aimed { image, x, y }
+    }
+
+    // `wide` has no gather: lanes are read one by one. Samples are whole and below 2^24, so f32 holds them exactly in
+    // whatever order they are worked out.
+    #[inline(always)]
+    fn read(self, Aimed { image, x, y }: Aimed) -> f32x8 {
         let part = f32x8::splat(1.0 / PARTS);
         let (column, row) = ((x * part).trunc(), (y * part).trunc());
         let (part_x, part_y) = (x - column * f32x8::splat(PARTS), y - row * f32x8::splat(PARTS));

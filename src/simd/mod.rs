@@ -27,6 +27,8 @@ pub trait Simd: Copy + Send + Sync {
     const LEVEL: Level;
     /// Eight f32.
     type F32: Copy;
+    /// Eight places in an image.
+    type Aimed<'a>: Copy;
 
     /// All lanes the same.
     fn splat(self, value: f32) -> Self::F32;
@@ -54,10 +56,12 @@ pub trait Simd: Copy + Send + Sync {
     fn whole(self, a: Self::F32) -> Self::F32;
     /// `y * stride + x` for whole, non-negative lanes, with a stride for each.
     fn places(self, strides: &[i32; LANES], x: Self::F32, y: Self::F32) -> [u32; LANES];
-    /// Bilinear samples at places in 256ths of a pixel ([`PARTS`]); the image repeats its border, and what is not a number
-    /// is 0. Of a place only the whole 256ths count, and f of them between two pixels weigh `255 - f` to `f`, so a sample
-    /// is a whole number: the grey value less 128, times 255 squared ([`WEIGHTS`]).
-    fn bilinear(self, image: &Taps, x: Self::F32, y: Self::F32) -> Self::F32;
+    /// Aims at places in 256ths of a pixel ([`PARTS`]), of which only the whole ones count; the image repeats its border,
+    /// and what is not a number is 0. Apart from [`Simd::read`], so that what takes long can be begun before it is needed.
+    fn aim<'a>(self, image: &'a Taps, x: Self::F32, y: Self::F32) -> Self::Aimed<'a>;
+    /// The bilinear samples there. f 256ths between two pixels weigh `255 - f` to `f`, so a sample is a whole number: the
+    /// grey value less 128, times 255 squared ([`WEIGHTS`]).
+    fn read(self, aimed: Self::Aimed<'_>) -> Self::F32;
     /// The four taps, lowest byte first, that [`Simd::bilinear`] reads for samples between these pairs and the next ones;
     /// an index beyond the last two pairs reads those. No more than reading: what sampling costs at least.
     fn gather(self, image: &Taps, pairs: &[u32; LANES]) -> [u32; LANES];
@@ -71,6 +75,11 @@ pub trait Simd: Copy + Send + Sync {
     #[inline(always)]
     fn sums(self, vectors: &[Self::F32; LANES]) -> Self::F32 {
         self.load(&vectors.map(|vector| self.sum(vector)))
+    }
+    /// The bilinear samples at places in 256ths of a pixel.
+    #[inline(always)]
+    fn bilinear(self, image: &Taps, x: Self::F32, y: Self::F32) -> Self::F32 {
+        self.read(self.aim(image, x, y))
     }
     /// Runs `f` compiled for this instruction set. Only what is inlined into `f` profits.
     fn vectorize<R>(self, f: impl FnOnce() -> R) -> R;

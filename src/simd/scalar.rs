@@ -7,9 +7,18 @@ use std::array::from_fn;
 #[derive(Debug, Clone, Copy)]
 pub struct Scalar;
 
+/// Places in an image, in 256ths of a pixel.
+#[derive(Debug, Clone, Copy)]
+pub struct Aimed<'a> {
+    image: &'a Taps,
+    x: [u32; LANES],
+    y: [u32; LANES],
+}
+
 impl Simd for Scalar {
     const LEVEL: Level = Level::Scalar;
     type F32 = [f32; LANES];
+    type Aimed<'a> = Aimed<'a>;
 
     #[inline(always)]
     fn splat(self, value: f32) -> Self::F32 {
@@ -77,12 +86,17 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
-    fn bilinear(self, image: &Taps, x: Self::F32, y: Self::F32) -> Self::F32 {
+    fn aim<'a>(self, image: &'a Taps, x: Self::F32, y: Self::F32) -> Aimed<'a> {
         let (right, bottom) = image.last();
         let x = self.min(self.max(x, [0.0; LANES]), [right; LANES]);
         let y = self.min(self.max(y, [0.0; LANES]), [bottom; LANES]);
+        Aimed { image, x: x.map(|x| x as u32), y: y.map(|y| y as u32) }
+    }
+
+    #[inline(always)]
+    fn read(self, Aimed { image, x, y }: Aimed) -> Self::F32 {
         from_fn(|lane| {
-            let (x, y) = (x[lane] as u32, y[lane] as u32);
+            let (x, y) = (x[lane], y[lane]);
             let index = (y >> 8) as usize * image.stride() + (x >> 8) as usize;
             let ([top_left, bottom_left], [top_right, bottom_right]) =
                 (image.pairs()[index], image.pairs()[index + 1]);

@@ -8,6 +8,15 @@ use core::arch::x86_64::*;
 #[derive(Debug, Clone, Copy)]
 pub struct X86V3(());
 
+/// Places in an image, in 256ths of a pixel, and the indices of the pairs to their upper left.
+#[derive(Debug, Clone, Copy)]
+pub struct Aimed<'a> {
+    image: &'a Taps,
+    x: __m256i,
+    y: __m256i,
+    index: __m256i,
+}
+
 impl X86V3 {
     /// The token, on a machine that has AVX2 and what comes with it: counting and finding bits.
     pub fn new() -> Option<X86V3> {
@@ -26,7 +35,7 @@ impl X86V3 {
     /// # Safety
     /// Every index is below the last pair's.
     #[inline(always)]
-    unsafe fn read(self, image: &Taps, indices: __m256i) -> __m256i {
+    unsafe fn read_pairs(self, image: &Taps, indices: __m256i) -> __m256i {
         // SAFETY: AVX2 is there: `self` exists. The caller's word is that two pairs lie at each index; the read may be
         // unaligned.
         unsafe {
@@ -74,6 +83,7 @@ impl X86V3 {
 impl Simd for X86V3 {
     const LEVEL: Level = Level::X86V3;
     type F32 = __m256;
+    type Aimed<'a> = Aimed<'a>;
 
     #[inline(always)]
     fn splat(self, value: f32) -> __m256 {
@@ -168,7 +178,7 @@ impl Simd for X86V3 {
     }
 
     #[inline(always)]
-    fn bilinear(self, image: &Taps, x: __m256, y: __m256) -> __m256 {
+    fn aim<'a>(self, image: &'a Taps, x: __m256, y: __m256) -> Aimed<'a> {
         let (right, bottom) = image.last();
         // SAFETY: AVX2 is there. Coordinates are brought into [0, right] and [0, bottom], `max` making 0 of what is not a
         // number, so with the image's stride every index is that of a pair that has another one after it.
@@ -178,7 +188,16 @@ impl Simd for X86V3 {
             let y = _mm256_cvttps_epi32(_mm256_min_ps(_mm256_max_ps(y, zero), _mm256_set1_ps(bottom)));
             let stride = _mm256_set1_epi32(image.stride() as i32);
             let row = _mm256_mullo_epi32(_mm256_srli_epi32::<8>(y), stride);
-            let taps = self.read(image, _mm256_add_epi32(row, _mm256_srli_epi32::<8>(x)));
+            Aimed { image, x, y, index: _mm256_add_epi32(row, _mm256_srli_epi32::<8>(x)) }
+        }
+    }
+
+    #[inline(always)]
+    fn read(self, Aimed { image, x, y, index }: Aimed) -> __m256 {
+        // SAFETY: AVX2 is there. Nothing but `aim` makes an `Aimed`, so every index is that of a pair of this image that
+        // has another one after it.
+        unsafe {
+            let taps = self.read_pairs(image, index);
             // The lowest byte of a coordinate is what weighs the lower or right taps; 255 less it the upper or left ones.
             let four_times = _mm256_setr_epi8(
                 0, 0, 0, 0, 4, 4, 4, 4, 8, 8, 8, 8, 12, 12, 12, 12, //
@@ -204,7 +223,7 @@ impl Simd for X86V3 {
         unsafe {
             let last = _mm256_set1_epi32((image.pairs().len() - 2) as i32);
             let index = _mm256_min_epu32(_mm256_loadu_si256(pairs.as_ptr().cast()), last);
-            _mm256_storeu_si256(taps.as_mut_ptr().cast(), self.read(image, index));
+            _mm256_storeu_si256(taps.as_mut_ptr().cast(), self.read_pairs(image, index));
         }
         taps
     }
