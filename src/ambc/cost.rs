@@ -286,25 +286,34 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     /// Adds what the hypothesis costs in the views of a group by their images.
     #[inline(always)]
     fn add_photometric_costs(&mut self, plane: &SlantedPlane, group: usize) {
-        let Evaluator { simd, window, patch, reference, placements, views, .. } = self;
-        let (group, InViews { placed, least }) = (&placements.groups()[group], &mut views[group]);
         if !self.has_texture {
-            least.iter_mut().for_each(|least| *least += MAX_COST);
+            self.views[group].least.iter_mut().for_each(|least| *least += MAX_COST);
             return;
         }
-        let slopes = group.slopes(*simd, plane);
-        let costs = patch_costs(
-            *simd,
-            window,
-            patch,
+        // A function of its own, also within what is compiled for the instruction set already: it is long, and called from
+        // many places.
+        self.simd.vectorize(
             #[inline(always)]
-            |lane| (reference.sources[group.sources()[lane]].image, placed.homography(&slopes, lane)),
-            placed.inside,
+            || {
+                let Evaluator { simd, window, patch, reference, placements, views, .. } = self;
+                let (group, InViews { placed, least }) = (&placements.groups()[group], &mut views[group]);
+                let slopes = group.slopes(*simd, plane);
+                let costs = patch_costs(
+                    *simd,
+                    window,
+                    patch,
+                    #[inline(always)]
+                    |lane| {
+                        (reference.sources[group.sources()[lane]].image, placed.homography(&slopes, lane))
+                    },
+                    placed.inside,
+                );
+                for (least, cost) in least.iter_mut().zip(costs) {
+                    *least += cost;
+                }
+                self.counts.ncc_evaluations += u64::from(placed.inside.count_ones());
+            },
         );
-        for (least, cost) in least.iter_mut().zip(costs) {
-            *least += cost;
-        }
-        self.counts.ncc_evaluations += u64::from(placed.inside.count_ones());
     }
 
     /// Equation 3 of the paper: a small set is penalised.

@@ -135,7 +135,8 @@ impl Simd for Base {
         a.sqrt()
     }
 
-    #[inline(always)]
+    // A function of its own, as where instructions beyond the compile target's are used.
+    #[inline(never)]
     fn vectorize<R>(self, f: impl FnOnce() -> R) -> R {
         f()
     }

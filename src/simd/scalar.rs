@@ -131,7 +131,8 @@ impl Simd for Scalar {
         a.map(f32::sqrt)
     }
 
-    #[inline(always)]
+    // A function of its own, as where instructions beyond the compile target's are used.
+    #[inline(never)]
     fn vectorize<R>(self, f: impl FnOnce() -> R) -> R {
         f()
     }
