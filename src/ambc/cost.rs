@@ -172,11 +172,18 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     /// stops as soon as it cannot stay below.
     #[inline(always)]
     pub fn cost(&mut self, food: &FoodSource, bound: f32) -> f32 {
-        self.place(food);
-        let cost = match self.rules.aggregation {
-            Aggregation::AllViews => self.all_views(food, bound),
-            Aggregation::BestViews(count) => self.best_views(food, bound, count as usize),
-        };
+        // A function of its own, also within what is compiled for the instruction set already: it is long, and called from
+        // many places.
+        let cost = self.simd.vectorize(
+            #[inline(always)]
+            || {
+                self.place(food);
+                match self.rules.aggregation {
+                    Aggregation::AllViews => self.all_views(food, bound),
+                    Aggregation::BestViews(count) => self.best_views(food, bound, count as usize),
+                }
+            },
+        );
         if cost < bound { cost } else { f32::INFINITY }
     }
 
@@ -290,8 +297,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
             self.views[group].least.iter_mut().for_each(|least| *least += MAX_COST);
             return;
         }
-        // A function of its own, also within what is compiled for the instruction set already: it is long, and called from
-        // many places.
+        // As `cost`, a function of its own.
         self.simd.vectorize(
             #[inline(always)]
             || {
@@ -303,9 +309,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
                     window,
                     patch,
                     #[inline(always)]
-                    |lane| {
-                        (reference.sources[group.sources()[lane]].image, placed.homography(&slopes, lane))
-                    },
+                    |lane| (reference.sources[group.sources()[lane]].image, placed.homography(&slopes, lane)),
                     placed.inside,
                 );
                 for (least, cost) in least.iter_mut().zip(costs) {

@@ -14,9 +14,10 @@ pub const MAX_COST: f32 = 2.0;
 pub struct Window {
     /// Half its side, in pixels.
     radius: usize,
-    /// Pairs of vectors that mirror each other at the pixel.
-    mirrored: Vec<[Offsets; 2]>,
-    rest: Vec<Offsets>,
+    /// All samples, those first of which two vectors mirror each other at the pixel.
+    vectors: Vec<Offsets>,
+    /// Pairs of vectors that do.
+    pairs: usize,
     /// `exp(-d^2 / (2 sigma^2))` of a difference d of grey values.
     colour_weights: Box<[f32; 256]>,
     samples: u64,
@@ -109,6 +110,7 @@ impl Window {
         let is_mirrored =
             |sample: &(i32, i32)| eights.iter().flatten().flatten().any(|other| other == sample);
         let rest: Vec<(i32, i32)> = samples.iter().filter(|sample| !is_mirrored(sample)).copied().collect();
+        let vectors = eights.as_flattened().iter().map(|eight| &eight[..]).chain(rest.chunks(LANES));
         let offsets = |samples: &[(i32, i32)]| Offsets::new(samples, radius, spatial_sigma);
         let colour_weight = |difference: usize| {
             let difference = difference as f64 / 255.0;
@@ -116,18 +118,12 @@ impl Window {
         };
         Window {
             radius: radius as usize,
-            mirrored: eights.iter().map(|pair| pair.map(|eight| offsets(&eight))).collect(),
-            rest: rest.chunks(LANES).map(offsets).collect(),
+            vectors: vectors.map(offsets).collect(),
+            pairs: eights.len(),
             colour_weights: Box::new(from_fn(colour_weight)),
             samples: samples.len() as u64,
             min_variance: (min_variance * 255.0 * 255.0) as f32,
         }
-    }
-
-    /// All vectors, in the order of a patch's.
-    #[inline(always)]
-    fn offsets(&self) -> impl Iterator<Item = &Offsets> {
-        self.mirrored.as_flattened().iter().chain(&self.rest)
     }
 
     /// The bilateral weight of a difference of grey values.
@@ -170,7 +166,7 @@ impl ReferencePatch {
     pub fn new(window: &Window) -> ReferencePatch {
         let zeros = [[0.0; LANES]; MAX_VECTORS];
         ReferencePatch {
-            vectors: window.offsets().count(),
+            vectors: window.vectors.len(),
             weights: zeros,
             weighted: zeros,
             mean: 0.0,
@@ -191,20 +187,16 @@ impl ReferencePatch {
     /// Samples the patch around a pixel. What lies outside the image weighs nothing.
     #[inline(always)]
     pub fn sample<S: Simd>(&mut self, simd: S, window: &Window, image: &PackedImage, x: usize, y: usize) {
-        let (radius, stride) = (window.radius, image.taps.stride() as i32);
+        let (radius, stride) = (window.radius, image.taps.stride());
         let is_inside = x >= radius && y >= radius && x + radius < image.width && y + radius < image.height;
-        let centre = image.taps.pairs()[y * image.taps.stride() + x][0];
-        let first = if is_inside {
-            &image.taps.pairs()[(y - radius) * image.taps.stride() + x - radius..]
-        } else {
-            &[]
-        };
+        let centre = image.taps.pairs()[y * stride + x][0];
         let (mut total, mut sum) = (simd.splat(0.0), simd.splat(0.0));
-        for (index, offsets) in window.offsets().enumerate() {
+        for (index, offsets) in window.vectors.iter().enumerate() {
             let (grey, weight) = if is_inside {
-                let places: [i32; LANES] = from_fn(|lane| offsets.row[lane] * stride + offsets.column[lane]);
-                let grey: [i8; LANES] = from_fn(|lane| first[places[lane] as usize][0]);
-                (grey, offsets.weight)
+                let corner = ((y - radius) * stride + x - radius) as i32;
+                let place = |lane| (corner + offsets.row[lane] * stride as i32 + offsets.column[lane]) as u32;
+                // The lowest of a place's taps is the grey value there.
+                (simd.gather(&image.taps, &from_fn(place)).map(|taps| taps as i8), offsets.weight)
             } else {
                 offsets.of_those_inside(image, (x, y), radius)
             };
@@ -278,10 +270,10 @@ pub fn patch_costs<'a, S: Simd>(
     wanted: u8,
 ) -> [f32; LANES] {
     // The loops over the vectors of the usual windows of 16 and 24 samples are rolled out.
-    let sums = match (&window.mirrored[..], &window.rest[..]) {
-        ([_], []) => correlate_views::<S, 2>(simd, window, patch, view, wanted),
-        ([_], [_]) => correlate_views::<S, 3>(simd, window, patch, view, wanted),
-        ([_, _], [_]) => correlate_views::<S, 5>(simd, window, patch, view, wanted),
+    let sums = match (window.pairs, window.vectors.len()) {
+        (1, 2) => correlate_views::<S, 2>(simd, window, patch, view, wanted),
+        (1, 3) => correlate_views::<S, 3>(simd, window, patch, view, wanted),
+        (2, 5) => correlate_views::<S, 5>(simd, window, patch, view, wanted),
         _ => correlate_views_in_turn(simd, window, patch, view, wanted),
     };
     let [sum, squares, products] = [simd.sums(&sums[0]), simd.sums(&sums[1]), simd.sums(&sums[2])];
@@ -316,7 +308,7 @@ fn correlate_views_in_turn<'a, S: Simd>(
     sums
 }
 
-/// The same for a window of a mirrored pair and up to one vector more, `N` in all. While a view's samples are added up,
+/// The same for a window of `N` vectors, all mirrored pairs but for the last one of an odd number. While a view's samples are added up,
 /// the next one's places are worked out: each waits for steps that take long.
 #[inline(always)]
 fn correlate_views<'a, S: Simd, const N: usize>(
@@ -346,16 +338,18 @@ fn correlate_views<'a, S: Simd, const N: usize>(
     sums
 }
 
-/// The places of the `N` vectors of a window of mirrored pairs and up to one vector more.
+/// The places of the `N` vectors of a window, all mirrored pairs but for the last one of an odd number.
 #[inline(always)]
 fn aim<'a, S: Simd, const N: usize>(simd: S, window: &Window, warp: &Warp<'a, S>) -> [S::Aimed<'a>; N] {
     let mut all = [warp.aim_at_centre(simd); N];
-    for (index, [offsets, _]) in window.mirrored[..N / 2].iter().enumerate() {
+    let vectors: &[Offsets; N] = window.vectors[..].try_into().expect("the window has N vectors");
+    for pair in 0..N / 2 {
+        let offsets = &vectors[2 * pair];
         let both = warp.aim_mirrored(simd, simd.load(&offsets.x), simd.load(&offsets.y));
-        [all[2 * index], all[2 * index + 1]] = both;
+        [all[2 * pair], all[2 * pair + 1]] = both;
     }
     if N % 2 == 1 {
-        let offsets = &window.rest[0];
+        let offsets = &vectors[N - 1];
         all[N - 1] = warp.aim(simd, simd.load(&offsets.x), simd.load(&offsets.y));
     }
     all
@@ -366,9 +360,8 @@ fn aim<'a, S: Simd, const N: usize>(simd: S, window: &Window, warp: &Warp<'a, S>
 fn add_up<S: Simd, const N: usize>(simd: S, patch: &ReferencePatch, aimed: [S::Aimed<'_>; N]) -> [S::F32; 3] {
     let mean = simd.splat(patch.mean * WEIGHTS);
     let mut sums = [simd.splat(0.0); 3];
-    for index in 0..N {
-        let side = (&patch.weights[index], &patch.weighted[index]);
-        sums = add(simd, sums, side, simd.sub(simd.read(aimed[index]), mean));
+    for (aimed, side) in aimed.into_iter().zip(patch.weights.iter().zip(&patch.weighted)) {
+        sums = add(simd, sums, side, simd.sub(simd.read(aimed), mean));
     }
     sums
 }
@@ -384,25 +377,26 @@ fn correlate<S: Simd>(
     homography: &PatchHomography,
 ) -> [S::F32; 3] {
     let warp = Warp::new(simd, source, homography);
-    match (&window.mirrored[..], &window.rest[..]) {
-        ([_], []) => add_up::<S, 2>(simd, patch, aim(simd, window, &warp)),
-        ([_], [_]) => add_up::<S, 3>(simd, patch, aim(simd, window, &warp)),
-        ([_, _], [_]) => add_up::<S, 5>(simd, patch, aim(simd, window, &warp)),
-        (pairs, rest) => correlate_vectors(simd, pairs, rest, patch, &warp),
+    match (window.pairs, window.vectors.len()) {
+        (1, 2) => add_up::<S, 2>(simd, patch, aim(simd, window, &warp)),
+        (1, 3) => add_up::<S, 3>(simd, patch, aim(simd, window, &warp)),
+        (2, 5) => add_up::<S, 5>(simd, patch, aim(simd, window, &warp)),
+        _ => correlate_vectors(simd, window, patch, &warp),
     }
 }
 
 #[inline(always)]
 fn correlate_vectors<S: Simd>(
     simd: S,
-    pairs: &[[Offsets; 2]],
-    rest: &[Offsets],
+    window: &Window,
     patch: &ReferencePatch,
     warp: &Warp<S>,
 ) -> [S::F32; 3] {
     let mean = simd.splat(patch.mean * WEIGHTS);
     let mut sums = [simd.splat(0.0); 3];
     let mut sides = patch.weights.iter().zip(&patch.weighted);
+    let (mirrored, rest) = window.vectors.split_at(2 * window.pairs);
+    let (pairs, _) = mirrored.as_chunks::<2>();
     for [offsets, _] in pairs {
         let both = warp.aim_mirrored(simd, simd.load(&offsets.x), simd.load(&offsets.y));
         for (aimed, side) in both.into_iter().zip(&mut sides) {

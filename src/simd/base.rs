@@ -2,7 +2,7 @@
 
 use super::{LANES, Level, PARTS, Scalar, Simd, Taps};
 use std::array::from_fn;
-use wide::f32x8;
+use wide::{f32x8, i32x8};
 
 /// The baseline back-end: SSE2 on x86-64, NEON on AArch64, simd128 on wasm.
 #[derive(Debug, Clone, Copy)]
@@ -101,14 +101,16 @@ impl Simd for Base {
         let part = f32x8::splat(1.0 / PARTS);
         let (column, row) = ((x * part).trunc(), (y * part).trunc());
         let (part_x, part_y) = (x - column * f32x8::splat(PARTS), y - row * f32x8::splat(PARTS));
-        let pairs: [[[i8; 2]; 2]; LANES] = {
-            let (column, row) = (column.to_array(), row.to_array());
-            from_fn(|lane| {
-                let index = row[lane] as u32 as usize * image.stride() + column[lane] as u32 as usize;
-                [image.pairs()[index], image.pairs()[index + 1]]
-            })
-        };
-        let tap = |right: usize, low: usize| f32x8::new(from_fn(|lane| f32::from(pairs[lane][right][low])));
+        let (columns, rows) = (column.to_array(), row.to_array());
+        let pixels = image.pairs();
+        let taps = i32x8::new(from_fn(|lane| {
+            let index = rows[lane] as u32 as usize * image.stride() + columns[lane] as u32 as usize;
+            let [[a, b], [c, d]] = [pixels[index], pixels[index + 1]];
+            i32::from_le_bytes([a, b, c, d].map(|tap| tap as u8))
+        }));
+        // A tap comes from its byte by way of the highest one.
+        let tap =
+            |right: usize, low: usize| f32x8::from_i32x8(taps << (24 - 16 * right - 8 * low) as i32 >> 24);
         let all = f32x8::splat(255.0);
         let left = (all - part_y) * tap(0, 0) + part_y * tap(0, 1);
         let right = (all - part_y) * tap(1, 0) + part_y * tap(1, 1);
