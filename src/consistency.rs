@@ -6,7 +6,7 @@ use crate::options::Options;
 use crate::progress::Cancelled;
 use crate::simd::{LANES, Level, Simd, Task, dispatch};
 use crate::state::{Solution, ViewState};
-use crate::views::{Placements, Reference, ViewSets};
+use crate::views::{AHEAD, Placements, Reference, ViewSets};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -158,6 +158,7 @@ impl CheckTask<'_> {
             // All are looked up before any is judged: the look-ups, far apart in memory, then do not wait for each other.
             let mut owns = [0.0; LANES];
             for (lane, (own, found)) in owns.iter_mut().zip(&self.found[index * LANES..]).enumerate() {
+                simd.prefetch(found, places[lane] as usize + AHEAD);
                 match found.get(places[lane] as usize) {
                     Some(found) => *own = found.depth,
                     None => asked &= !(1 << lane),

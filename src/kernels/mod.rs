@@ -3,6 +3,8 @@
 mod homography;
 mod ncc;
 mod warp;
+mod window;
 
 pub use homography::{PatchHomography, RelativePose, SlantedPlane};
-pub use ncc::{MAX_COST, ReferencePatch, Window, patch_cost, patch_costs};
+pub use ncc::{MAX_COST, ReferencePatch, patch_cost, patch_costs};
+pub use window::Window;

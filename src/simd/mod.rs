@@ -65,6 +65,9 @@ pub trait Simd: Copy + Send + Sync {
     /// The four taps, lowest byte first, that [`Simd::bilinear`] reads for samples between these pairs and the next ones;
     /// an index beyond the last two pairs reads those. No more than reading: what sampling costs at least.
     fn gather(self, image: &Taps, pairs: &[u32; LANES]) -> [u32; LANES];
+    /// Has what lies at an index of a slice, or about there, brought near: nothing that a result depends on.
+    #[inline(always)]
+    fn prefetch<T>(self, _slice: &[T], _index: usize) {}
     /// The sum of the lanes, as `((l0 + l4) + (l2 + l6)) + ((l1 + l5) + (l3 + l7))`.
     fn sum(self, a: Self::F32) -> f32;
     /// The largest lane; no lane may be anything else than a number.

@@ -229,6 +229,12 @@ impl Simd for X86V3 {
     }
 
     #[inline(always)]
+    fn prefetch<T>(self, slice: &[T], index: usize) {
+        // SAFETY: the instruction reads nothing and takes any address.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(slice.as_ptr().wrapping_add(index).cast()) };
+    }
+
+    #[inline(always)]
     fn sum(self, a: __m256) -> f32 {
         // SAFETY: AVX is there.
         unsafe {

@@ -9,7 +9,7 @@ mod set;
 mod surface;
 
 pub use angle::{SourceLists, source_lists, triangulation_angle};
-pub use placement::{Found, Group, Placed, Placements, Surfaces};
+pub use placement::{AHEAD, Found, Group, Placed, Placements, Surfaces};
 pub use reference::{Reference, Source};
 pub use select::{ViewRules, ViewSelector, are_occluded, faces_sources, select_sets};
 pub use set::ViewSets;

@@ -8,6 +8,9 @@ use std::array::from_fn;
 
 type Lanes = [f32; LANES];
 
+/// How many pixels on, in the row, those pixels are expected to fall that come next.
+pub const AHEAD: usize = 16;
+
 /// The source views of a pixel's view set, and where the pixel lies in them for any depth.
 #[derive(Debug, Clone)]
 pub struct Placements<'a, S: Simd> {
@@ -311,6 +314,9 @@ impl<'a> Group<'a> {
 
     #[inline(always)]
     fn shown<S: Simd>(&self, simd: S, nearest: &Nearest<S>) -> Shown<S> {
+        for (lane, surface) in self.surfaces.iter().enumerate() {
+            simd.prefetch(surface, nearest.places[lane] as usize + AHEAD);
+        }
         let planes: [ShownPlane; LANES] = from_fn(|lane| {
             self.surfaces[lane].get(nearest.places[lane] as usize).copied().unwrap_or_default()
         });
