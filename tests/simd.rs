@@ -108,7 +108,7 @@ struct Bilinear<'a>(&'a Taps, Lanes, Lanes);
 
 impl Operation for Bilinear<'_> {
     fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
-        vec![simd.store(simd.bilinear(self.0, simd.load(&self.1), simd.load(&self.2)))]
+        vec![simd.store(simd.read(simd.aim(self.0, simd.load(&self.1), simd.load(&self.2))))]
     }
 }
 

@@ -135,7 +135,7 @@ pub fn patch_costs<'a, S: Simd>(
     view: impl FnMut(usize) -> (&'a PackedImage, PatchHomography),
     wanted: u8,
 ) -> [f32; LANES] {
-    // The loops over the vectors of the usual windows of 16 and 24 samples are rolled out.
+    // The loops over the vectors of the usual windows of 16, 24 and 36 samples are rolled out.
     let sums = match (window.pairs, window.vectors.len()) {
         (1, 2) => correlate_views::<S, 2>(simd, window, patch, view, wanted),
         (1, 3) => correlate_views::<S, 3>(simd, window, patch, view, wanted),
@@ -169,7 +169,8 @@ fn correlate_views_in_turn<'a, S: Simd>(
         let lane = rest.trailing_zeros() as usize % LANES;
         rest &= rest - 1;
         let (source, homography) = view(lane);
-        [sums[0][lane], sums[1][lane], sums[2][lane]] = correlate(simd, window, patch, source, &homography);
+        let warp = Warp::new(simd, source, &homography);
+        [sums[0][lane], sums[1][lane], sums[2][lane]] = correlate_vectors(simd, window, patch, &warp);
     }
     sums
 }
@@ -207,6 +208,7 @@ fn correlate_views<'a, S: Simd, const N: usize>(
 /// The places of the `N` vectors of a window, all mirrored pairs but for the last one of an odd number.
 #[inline(always)]
 fn aim<'a, S: Simd, const N: usize>(simd: S, window: &Window, warp: &Warp<'a, S>) -> [S::Aimed<'a>; N] {
+    // Each is set below.
     let mut all = [warp.aim_at_centre(simd); N];
     let vectors: &[Offsets; N] = window.vectors[..].try_into().expect("the window has N vectors");
     for pair in 0..N / 2 {

@@ -62,7 +62,7 @@ pub trait Simd: Copy + Send + Sync {
     /// The bilinear samples there. f 256ths between two pixels weigh `255 - f` to `f`, so a sample is a whole number: the
     /// grey value less 128, times 255 squared ([`WEIGHTS`]).
     fn read(self, aimed: Self::Aimed<'_>) -> Self::F32;
-    /// The four taps, lowest byte first, that [`Simd::bilinear`] reads for samples between these pairs and the next ones;
+    /// The four taps, lowest byte first, that [`Simd::read`] reads for samples between these pairs and the next ones;
     /// an index beyond the last two pairs reads those. No more than reading: what sampling costs at least.
     fn gather(self, image: &Taps, pairs: &[u32; LANES]) -> [u32; LANES];
     /// Has what lies at an index of a slice, or about there, brought near: nothing that a result depends on.
@@ -78,11 +78,6 @@ pub trait Simd: Copy + Send + Sync {
     #[inline(always)]
     fn sums(self, vectors: &[Self::F32; LANES]) -> Self::F32 {
         self.load(&vectors.map(|vector| self.sum(vector)))
-    }
-    /// The bilinear samples at places in 256ths of a pixel.
-    #[inline(always)]
-    fn bilinear(self, image: &Taps, x: Self::F32, y: Self::F32) -> Self::F32 {
-        self.read(self.aim(image, x, y))
     }
     /// Runs `f` compiled for this instruction set. Only what is inlined into `f` profits.
     fn vectorize<R>(self, f: impl FnOnce() -> R) -> R;
