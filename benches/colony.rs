@@ -3,9 +3,10 @@
 #[path = "../tests/common/mod.rs"]
 mod common;
 
+use common::changed;
 use common::procedural::{self, MIDDLE};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use skep::{Options, Scale, Steps, ignore_progress};
+use skep::{Options, Scale, Stepper, ignore_progress};
 use std::hint::black_box;
 
 fn colony(criterion: &mut Criterion) {
@@ -20,10 +21,18 @@ fn colony(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("a tile of 64 x 64 pixels");
     group.sample_size(10);
     for (name, iterations) in [("colonies filled", 0), ("colonies filled and one iteration", 1)] {
-        let scale =
-            Scale { halvings: 0, foods: 3, first_iterations: iterations, cycles: 0, cycle_iterations: 0 };
-        let options = Options { threads: 1, scales: vec![scale], ..Options::default() };
-        let steps = Steps::new(&scene, &options).unwrap();
+        let scale = Scale {
+            downscale: 1,
+            food_sources: 3,
+            first_iterations: iterations,
+            cycles: 0,
+            cycle_iterations: 0,
+        };
+        let options = changed(Options::default(), |o| {
+            o.threads = 1;
+            o.schedule.scales = vec![scale];
+        });
+        let steps = Stepper::new(&scene, &options).unwrap();
         let search = || steps.search(0, MIDDLE, &[], None, &ignore_progress).unwrap();
         group.throughput(Throughput::Elements(search().counts().ncc_evaluations));
         group.bench_function(name, |bencher| bencher.iter(|| black_box(search())));

@@ -18,7 +18,7 @@ fn fusion(criterion: &mut Criterion) {
         .map(|((view, maps), overlap)| FusionView {
             camera: &view.camera,
             maps,
-            outcome: None,
+            status: None,
             picture: Some(&view.picture),
             overlap,
         })

@@ -10,12 +10,11 @@ use common::procedural::{self, MIDDLE, Procedural};
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec2;
-use skep::camera::Camera;
+use skep::geometry::Camera;
+use skep::geometry::{RelativePose, SlantedPlane};
 use skep::image::PackedImage;
-use skep::kernels::{
-    PatchHomography, ReferencePatch, RelativePose, SlantedPlane, Window, patch_cost, patch_costs,
-};
-use skep::simd::{LANES, Level, Simd, Task, dispatch};
+use skep::matching::{PatchHomography, ReferencePatch, Window, patch_cost, patch_costs};
+use skep::simd::{LANES, Simd, SimdLevel, Task, dispatch};
 use std::hint::black_box;
 
 /// Source views of the patches that are matched with several.
@@ -48,7 +47,7 @@ impl Patches {
         let source = |view: usize| {
             let pose = RelativePose::new(camera, &made.views[view].camera);
             let homography = |(&(x, y), plane): (&(usize, usize), &SlantedPlane)| {
-                pose.homography(pose.at_infinity(x as f32, y as f32), plane)
+                PatchHomography::of_plane(&pose, pose.at_infinity(x as f32, y as f32), plane)
             };
             let image = PackedImage::new(&made.views[view].picture);
             Source { image, pose, homographies: pixels.iter().zip(&planes).map(homography).collect() }
@@ -102,7 +101,8 @@ impl Task for Compare<'_> {
             || {
                 let mut sum = 0.0;
                 for (&(x, y), plane) in pixels.iter().zip(planes) {
-                    let homography = pose.homography(pose.at_infinity(x as f32, y as f32), plane);
+                    let homography =
+                        PatchHomography::of_plane(&pose, pose.at_infinity(x as f32, y as f32), plane);
                     sum += patch_cost(simd, window, patch, image, &homography);
                 }
                 sum
@@ -128,7 +128,7 @@ impl Task for CompareViews<'_> {
                     patch.sample(simd, window, reference, x, y);
                     let view = |index: usize| {
                         let Source { image, pose, .. } = &sources[index];
-                        (image, pose.homography(pose.at_infinity(x as f32, y as f32), plane))
+                        (image, PatchHomography::of_plane(&pose, pose.at_infinity(x as f32, y as f32), plane))
                     };
                     sum += patch_costs(simd, window, &patch, view, 0b1111)[0];
                 }
@@ -151,7 +151,7 @@ impl Task for Homographies<'_> {
             #[inline(always)]
             || {
                 for (&(x, y), plane) in pixels.iter().zip(planes) {
-                    black_box(pose.homography(pose.at_infinity(x as f32, y as f32), plane));
+                    black_box(PatchHomography::of_plane(&pose, pose.at_infinity(x as f32, y as f32), plane));
                 }
             },
         );
@@ -188,11 +188,11 @@ fn places(patches: &Patches) -> Vec<[u32; LANES]> {
     let offsets: Vec<(f32, f32)> =
         (-5..=5).step_by(2).flat_map(|y| (-5..=5).step_by(2).map(move |x| (x as f32, y as f32))).collect();
     let mut places = Vec::new();
-    for PatchHomography { centre, along_x, along_y } in homographies {
+    for PatchHomography { center, along_x, along_y } in homographies {
         for eight in offsets.chunks(LANES) {
             places.push(std::array::from_fn(|lane| {
                 let (dx, dy) = eight[lane.min(eight.len() - 1)];
-                let point = *centre + dx * *along_x + dy * *along_y;
+                let point = *center + dx * *along_x + dy * *along_y;
                 let inside = |at: f32, size: usize| at.clamp(0.0, (size - 1) as f32) as usize;
                 let (x, y) =
                     (inside(point.x / point.z, image.width), inside(point.y / point.z, image.height));
@@ -203,15 +203,15 @@ fn places(patches: &Patches) -> Vec<[u32; LANES]> {
     places
 }
 
-fn on_every_level(group: &mut BenchmarkGroup<WallTime>, mut run: impl FnMut(Level)) {
-    for level in Level::ALL.into_iter().filter(|level| level.is_available()) {
+fn on_every_level(group: &mut BenchmarkGroup<WallTime>, mut run: impl FnMut(SimdLevel)) {
+    for level in SimdLevel::ALL.into_iter().filter(|level| level.is_available()) {
         group.bench_function(level.name(), |bencher| bencher.iter(|| run(level)));
     }
 }
 
 fn kernels(criterion: &mut Criterion) {
     let made = procedural::plane_and_sphere();
-    let mut group_of = |name: &str, elements: usize, run: &mut dyn FnMut(Level)| {
+    let mut group_of = |name: &str, elements: usize, run: &mut dyn FnMut(SimdLevel)| {
         let mut group = criterion.benchmark_group(name);
         group.throughput(Throughput::Elements(elements as u64));
         on_every_level(&mut group, run);
@@ -224,7 +224,7 @@ fn kernels(criterion: &mut Criterion) {
     ];
     for (name, window) in windows {
         let patches = Patches::new(&made, window);
-        let sampled = dispatch(Level::Scalar, Sample(&patches));
+        let sampled = dispatch(SimdLevel::Scalar, Sample(&patches));
         let count = patches.pixels.len();
         group_of(&format!("homography and NCC of a patch, {name}"), count, &mut |level| {
             black_box(dispatch(level, Compare(&patches, black_box(&sampled))));

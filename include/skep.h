@@ -4,7 +4,7 @@
  * levels, which can be mixed:
  *
  *   whole    skep_scene_create, skep_scene_add_view ..., skep_reconstruct, skep_result_get_..., skep_cloud_get_points
- *   stepwise skep_steps_create, then search, check and propagate single views; skep_fuse fuses any maps
+ *   stepwise skep_stepper_create, then search, check and propagate single views; skep_fuse fuses any maps
  *   kernels  skep_plane_homographies, skep_patch_ncc: stateless, no allocation
  *
  * and files: skep_scene_read_colmap, skep_result_write_workspace and others, for programs without a parser.
@@ -56,7 +56,7 @@
 /**
  * The object cannot be used any more: a call that was changing it panicked. Destroy it.
  */
-#define SKEP_ERR_STATE -3
+#define SKEP_ERR_POISONED -3
 
 /**
  * The progress callback asked to stop.
@@ -79,10 +79,10 @@
 #define SKEP_ERR_PANIC -7
 
 /**
- * Grey. An image's format is a layout, of 8 bits a channel, plus a depth when it is another: SKEP_FORMAT_BGR is 8-bit
+ * Gray. An image's format is a layout, of 8 bits a channel, plus a depth when it is another: SKEP_FORMAT_BGR is 8-bit
  * BGR, SKEP_FORMAT_BGR + SKEP_FORMAT_16 is 16-bit BGR.
  */
-#define SKEP_FORMAT_GREY 0
+#define SKEP_FORMAT_GRAY 0
 
 /**
  * Red, green, blue.
@@ -172,7 +172,12 @@
 /**
  * No step: the run is done.
  */
-#define SKEP_STEP_NONE 4294967295
+#define SKEP_CYCLE_NONE 4294967295
+
+/**
+ * Planes that other views offer to the pixels of a view. Never changes.
+ */
+typedef struct skep_candidates skep_candidates;
 
 /**
  * Fused points. Never changes: may be used from several threads at once.
@@ -180,14 +185,25 @@
 typedef struct skep_cloud skep_cloud;
 
 /**
- * Planes that other views offer to the pixels of a view. Never changes.
+ * What is known of one view after it was searched in a step or, once checked, after the check. Never changes: may be
+ * used from several threads at once.
  */
-typedef struct skep_offers skep_offers;
+typedef struct skep_estimate skep_estimate;
+
+/**
+ * Where patches are sampled and how samples are weighted. Never changes: may be used from several threads at once.
+ */
+typedef struct skep_ncc_window skep_ncc_window;
 
 /**
  * Every number the method depends on. May be used from several threads at once.
  */
 typedef struct skep_options skep_options;
+
+/**
+ * A gray image in the layout the kernels sample. Never changes: may be used from several threads at once.
+ */
+typedef struct skep_packed_image skep_packed_image;
 
 /**
  * Maps of views, and the cloud when they come from a whole run. Never changes: may be used from several threads at
@@ -196,75 +212,33 @@ typedef struct skep_options skep_options;
 typedef struct skep_result skep_result;
 
 /**
- * A grey image in the layout the kernels sample. Never changes: may be used from several threads at once.
- */
-typedef struct skep_samples skep_samples;
-
-/**
  * Calibrated photographs and sparse points. May be used from several threads at once; runs that were started with it
  * keep what it was when they started. Pictures are copied in and shared from then on: a run does not copy them again.
  */
 typedef struct skep_scene skep_scene;
 
 /**
- * What is known of one view after it was searched in a step or, once checked, after the check. Never changes: may be
- * used from several threads at once.
- */
-typedef struct skep_state skep_state;
-
-/**
  * A run taken apart, for hosts that schedule views themselves, on one machine or on many, or that bring maps of their
- * own. Holds what all steps share (images of all scales, source views, threads) and never changes: steps of
+ * own. Holds what all stepper share (images of all scales, source views, threads) and never changes: stepper of
  * different views may be taken at the same time from several threads. The scene may be destroyed.
  *
- * A run is this, for step 0 and then for what skep_steps_next says, until that is SKEP_STEP_NONE:
- *   - when the step is on a finer scale than the states, skep_steps_hand_up each of them;
- *   - skep_steps_propagate, then skep_steps_search each view, all from the states the step before left;
- *   - skep_steps_check each view against what all have just found: that is what the next step starts from.
+ * A run is this, for step 0 and then for what skep_stepper_next says, until that is SKEP_CYCLE_NONE:
+ *   - when the step is on a finer scale than the estimates, skep_stepper_upsample each of them;
+ *   - skep_stepper_propagate, then skep_stepper_search each view, all from the estimates the step before left;
+ *   - skep_stepper_check each view against what all have just found: that is what the next step starts from.
  *
- * After the last, skep_steps_finish each view, and skep_fuse the validated maps. Done so for all views, that gives the
+ * After the last, skep_stepper_finish each view, and skep_fuse the validated maps. Done so for all views, that gives the
  * same bits as skep_reconstruct.
  *
  * States are passed as an array with one pointer for each view of the scene. Looked at are only the view itself, its
  * sources, and the views it is a source of; NULL says that nothing is known of a view. (NULL, 0) knows of none.
  */
-typedef struct skep_steps skep_steps;
-
-/**
- * Where patches are sampled and how samples are weighted. Never changes: may be used from several threads at once.
- */
-typedef struct skep_window skep_window;
+typedef struct skep_stepper skep_stepper;
 
 /**
  * What a call came to: SKEP_OK or one of the negative SKEP_ERR_ codes. skep_last_error tells the rest.
  */
 typedef int32_t skep_status;
-
-/**
- * The search on one scale of the image pyramid.
- */
-typedef struct skep_scale {
-    /**
-     * How often the images are halved: 0 is full size.
-     */
-    uint32_t halvings;
-    /**
-     * Food sources of each pixel's colony, 2 to 64.
-     */
-    uint32_t foods;
-    /**
-     * Iterations of the first cycle on this scale.
-     */
-    uint32_t first_iterations;
-    /**
-     * Cycles after the first.
-     */
-    uint32_t cycles;
-    /**
-     * Iterations of each of those.
-     */
-    uint32_t cycle_iterations;
-} skep_scale;
 
 /**
  * Pixels in the caller's memory, which is only read, and only during the call. This struct never changes.
@@ -294,7 +268,7 @@ typedef struct skep_image {
 
 /**
  * A pinhole camera without distortion. x_cam = rotation * X_world + translation, with x right, y down, z forward;
- * depth is z. The centre of the top-left pixel is (0, 0), as in OpenCV; COLMAP's principal points are half a pixel
+ * depth is z. The center of the top-left pixel is (0, 0), as in OpenCV; COLMAP's principal points are half a pixel
  * larger. This struct never changes.
  */
 typedef struct skep_camera {
@@ -339,7 +313,7 @@ typedef struct skep_progress {
     /**
      * Size of the images searched: 1 is full, 2 half, 4 a quarter.
      */
-    uint32_t reduction;
+    uint32_t downscale;
     /**
      * The cycle on this scale, counted from 0.
      */
@@ -373,25 +347,25 @@ typedef struct skep_statistics {
     /**
      * Bilinear samples taken from source views.
      */
-    uint64_t samples;
+    uint64_t bilinear_samples;
     /**
      * Hypotheses given up before all their source views were looked at.
      */
-    uint64_t early_outs;
+    uint64_t early_terminations;
     /**
      * Number of pixels of each SKEP_PIXEL_ value; those beyond the last are 0.
      */
-    uint64_t pixels[8];
+    uint64_t status_counts[8];
 } skep_statistics;
 
 /**
  * One cycle's search of one view.
  */
-typedef struct skep_cycle {
+typedef struct skep_cycle_record {
     /**
      * Size of the images: 1 is full, 2 half, 4 a quarter.
      */
-    uint32_t reduction;
+    uint32_t downscale;
     /**
      * The cycle on that scale, counted from 0.
      */
@@ -408,7 +382,7 @@ typedef struct skep_cycle {
      * Pixels validated by the check after it.
      */
     uint64_t validated;
-} skep_cycle;
+} skep_cycle_record;
 
 /**
  * A view with maps to be fused, in the caller's memory, which is only read, and only during the call. This struct
@@ -444,7 +418,7 @@ typedef struct skep_fusion_view {
      */
     size_t normal_stride_bytes;
     /**
-     * For the colours, of the maps' size; NULL gives grey points.
+     * For the colors, of the maps' size; NULL gives gray points.
      */
     const struct skep_image *image_or_null;
     /**
@@ -460,29 +434,29 @@ typedef struct skep_fusion_view {
 /**
  * One cycle on one scale.
  */
-typedef struct skep_step {
+typedef struct skep_cycle {
     /**
      * Size of the images: 1 is full, 2 half, 4 a quarter.
      */
-    uint32_t reduction;
+    uint32_t downscale;
     /**
      * The cycle on that scale, counted from 0.
      */
-    uint32_t cycle;
+    uint32_t cycle_on_scale;
     /**
      * Food sources of each pixel's colony.
      */
-    uint32_t foods;
+    uint32_t food_sources;
     /**
      * Rounds of bees.
      */
     uint32_t iterations;
-} skep_step;
+} skep_cycle;
 
 /**
- * What a state is.
+ * What a estimate is.
  */
-typedef struct skep_state_info {
+typedef struct skep_estimate_info {
     /**
      * The view it is of.
      */
@@ -490,7 +464,7 @@ typedef struct skep_state_info {
     /**
      * The step it was searched in, or whose scale it was handed up to.
      */
-    uint32_t step;
+    uint32_t cycle;
     /**
      * 1 when it carries the verdicts of a check, else 0.
      */
@@ -515,7 +489,7 @@ typedef struct skep_state_info {
      * NCC evaluations spent on the view so far.
      */
     uint64_t ncc_evaluations;
-} skep_state_info;
+} skep_estimate_info;
 
 /**
  * A plane in the reference camera's frame: normal . X = -distance, with a unit normal that faces the camera and a
@@ -527,7 +501,7 @@ typedef struct skep_plane {
      */
     double normal[3];
     /**
-     * Distance from the camera's centre.
+     * Distance from the camera's center.
      */
     double distance;
 } skep_plane;
@@ -547,10 +521,10 @@ uint32_t skep_abi_version(void);
 const char *skep_version(void);
 
 /**
- * The instruction set that runs are made on unless an option says otherwise: "scalar", "base" or "v3" (AVX2); static.
+ * The instruction set that runs are made on unless an option says otherwise: "scalar", "baseline" or "v3" (AVX2); static.
  * The environment variable SKEP_SIMD forces one of them, lowered to what the machine has. Results do not depend on it.
  */
-const char *skep_backend_name(void);
+const char *skep_simd_level_name(void);
 
 /**
  * A word for a status, such as "argument"; static, never NULL.
@@ -580,54 +554,43 @@ skep_status skep_options_create(const char *preset_or_null,
 void skep_options_destroy(struct skep_options *options);
 
 /**
- * Sets an option that is a number. Switches are 0 or 1; whole numbers must be whole. skep_option_name lists the names;
- * `skep info` shows them with the values of the presets.
+ * Sets an option that is a number. Switches are 0 or 1; whole numbers must be whole. The list of options above explains
+ * each; where a name is the only one without its group, it may be left out.
  *
- * SKEP_ERR_ARGUMENT: no option of this name, or a value out of its range; the text says what would be right.
+ * SKEP_ERR_ARGUMENT: no option of this name, or one that is a text, or a value out of its range.
  */
 skep_status skep_options_set(struct skep_options *options,
                              const char *name,
                              double value);
 
 /**
- * Gets an option that is a number.
+ * Gets an option that is a number; switches are 0 or 1.
+ *
+ * SKEP_ERR_ARGUMENT: no option of this name, or one that is a text.
  */
 skep_status skep_options_get(const struct skep_options *options, const char *name, double *value_out);
 
 /**
- * Sets the seed of the random generator. The same seed, input and library version give the same bits.
+ * Sets any option from its text: a number, "true" or "false", a name, or a schedule such as
+ * "downscale=2 food_sources=3 iterations=5+4x1; downscale=1 food_sources=2 iterations=1+2x1".
+ *
+ * SKEP_ERR_ARGUMENT: no option of this name, or a text or value that it does not take.
  */
-skep_status skep_options_set_seed(struct skep_options *options, uint64_t seed);
+skep_status skep_options_set_text(struct skep_options *options, const char *name, const char *value);
 
 /**
- * Gets the seed.
+ * Copies the text of any option, which skep_options_set_text takes; see skep_scene_get_name for the buffer.
+ *
+ * SKEP_ERR_ARGUMENT: no option of this name.
  */
-skep_status skep_options_get_seed(const struct skep_options *options, uint64_t *seed_out);
+skep_status skep_options_get_text(const struct skep_options *options,
+                                  const char *name,
+                                  char *buffer,
+                                  size_t capacity,
+                                  size_t *needed_out);
 
 /**
- * Sets the instruction set: "scalar", "base", "v3", or NULL for the best the machine has. A level that the machine does
- * not have is lowered to one it has. The result does not depend on it.
- */
-skep_status skep_options_set_simd(struct skep_options *options,
-                                  const char *level_or_null);
-
-/**
- * Sets the scales from coarse to fine: halvings descend one by one to 0.
- */
-skep_status skep_options_set_scales(struct skep_options *options,
-                                    const struct skep_scale *scales,
-                                    size_t count);
-
-/**
- * Gets the scales. `scales` may be NULL to only ask for their number.
- */
-skep_status skep_options_get_scales(const struct skep_options *options,
-                                    struct skep_scale *scales,
-                                    size_t capacity,
-                                    size_t *count_out);
-
-/**
- * The name of the option that is a number with this index, counted from 0; static. NULL after the last.
+ * The name of the option with this index, counted from 0; static. NULL after the last.
  */
 const char *skep_option_name(size_t index);
 
@@ -642,7 +605,7 @@ skep_status skep_scene_create(struct skep_scene **scene_out);
 void skep_scene_destroy(struct skep_scene *scene);
 
 /**
- * Adds a photograph, copied, rounded to 8 bits a channel; grey is the luma of colours (ITU-R BT.601). `name_or_null`
+ * Adds a photograph, copied, rounded to 8 bits a channel; gray is the luma of colors (ITU-R BT.601). `name_or_null`
  * (UTF-8, copied) names it in messages and files; NULL names it "view0000.png" by its number. Views are numbered in the
  * order they are added; `view_out`, which may be NULL, receives the number.
  */
@@ -842,10 +805,10 @@ skep_status skep_result_get_cost(const struct skep_result *result,
 /**
  * Copies what became of every pixel, a SKEP_PIXEL_ value each: the reason where there is no validated depth.
  */
-skep_status skep_result_get_outcome(const struct skep_result *result,
-                                    uint32_t view,
-                                    uint8_t *out,
-                                    size_t stride_bytes);
+skep_status skep_result_get_status(const struct skep_result *result,
+                                   uint32_t view,
+                                   uint8_t *out,
+                                   size_t stride_bytes);
 
 /**
  * Copies the number of source views of every pixel; `stride_bytes` is at least 2 * width.
@@ -895,7 +858,7 @@ skep_status skep_result_get_statistics(const struct skep_result *result,
  */
 skep_status skep_result_get_cycles(const struct skep_result *result,
                                    uint32_t view,
-                                   struct skep_cycle *cycles,
+                                   struct skep_cycle_record *cycles,
                                    size_t capacity,
                                    size_t *count_out);
 
@@ -927,9 +890,9 @@ skep_status skep_result_borrow_cost(const struct skep_result *result,
  * The SKEP_PIXEL_ values inside the result, without a copy: height rows of width bytes, dense. Valid until the result
  * is destroyed; only to be read.
  */
-skep_status skep_result_borrow_outcome(const struct skep_result *result,
-                                       uint32_t view,
-                                       const uint8_t **outcome_out);
+skep_status skep_result_borrow_status(const struct skep_result *result,
+                                      uint32_t view,
+                                      const uint8_t **status_out);
 
 /**
  * Destroys a cloud; NULL is ignored.
@@ -943,13 +906,13 @@ skep_status skep_cloud_get_count(const struct skep_cloud *cloud, size_t *count_o
 
 /**
  * Copies the points: `positions` x, y, z in the world (3 doubles a point), `normals` unit vectors in the world (3
- * floats a point), `colours` red, green, blue (3 bytes a point, 128 where no picture was given). Any of them may be
+ * floats a point), `colors` red, green, blue (3 bytes a point, 128 where no picture was given). Any of them may be
  * NULL. `capacity` is the number of points each buffer has room for; SKEP_ERR_CAPACITY when it is less than there are.
  */
 skep_status skep_cloud_get_points(const struct skep_cloud *cloud,
                                   double *positions,
                                   float *normals,
-                                  uint8_t *colours,
+                                  uint8_t *colors,
                                   size_t capacity);
 
 /**
@@ -977,185 +940,187 @@ skep_status skep_fuse(const struct skep_fusion_view *views,
                       struct skep_cloud **cloud_out);
 
 /**
- * Prepares the steps of a run.
+ * Prepares the stepper of a run.
  *
  * SKEP_ERR_ARGUMENT: the scene is not in order (see skep_scene_validate) or an option is out of range.
  */
-skep_status skep_steps_create(const struct skep_scene *scene,
-                              const struct skep_options *options_or_null,
-                              struct skep_steps **steps_out);
+skep_status skep_stepper_create(const struct skep_scene *scene,
+                                const struct skep_options *options_or_null,
+                                struct skep_stepper **stepper_out);
 
 /**
- * Destroys steps and ends their threads; NULL is ignored. States and results stay.
+ * Destroys stepper and ends their threads; NULL is ignored. States and results stay.
  */
-void skep_steps_destroy(struct skep_steps *steps);
+void skep_stepper_destroy(struct skep_stepper *stepper);
 
 /**
- * The number of steps, and of views. Either output may be NULL.
+ * The number of stepper, and of views. Either output may be NULL.
  */
-skep_status skep_steps_get_count(const struct skep_steps *steps,
-                                 uint32_t *step_count_out,
-                                 uint32_t *view_count_out);
+skep_status skep_stepper_get_count(const struct skep_stepper *stepper,
+                                   uint32_t *cycle_count_out,
+                                   uint32_t *view_count_out);
 
 /**
  * What a step does.
  */
-skep_status skep_steps_get_step(const struct skep_steps *steps, uint32_t step, struct skep_step *step_out);
+skep_status skep_stepper_get_cycle(const struct skep_stepper *stepper,
+                                   uint32_t cycle,
+                                   struct skep_cycle *cycle_out);
 
 /**
  * Width and height of a view's maps at a step.
  */
-skep_status skep_steps_get_size(const struct skep_steps *steps,
-                                uint32_t step,
-                                uint32_t view,
-                                uint32_t *width_out,
-                                uint32_t *height_out);
+skep_status skep_stepper_get_size(const struct skep_stepper *stepper,
+                                  uint32_t cycle,
+                                  uint32_t view,
+                                  uint32_t *width_out,
+                                  uint32_t *height_out);
 
 /**
- * The source views of a view: those whose states its steps look at. `sources` may be NULL to only ask for their number.
+ * The source views of a view: those whose estimates its stepper look at. `sources` may be NULL to only ask for their number.
  */
-skep_status skep_steps_get_sources(const struct skep_steps *steps,
-                                   uint32_t view,
-                                   uint32_t *sources,
-                                   size_t capacity,
-                                   size_t *count_out);
+skep_status skep_stepper_get_sources(const struct skep_stepper *stepper,
+                                     uint32_t view,
+                                     uint32_t *sources,
+                                     size_t capacity,
+                                     size_t *count_out);
 
 /**
  * The planes that other views offer to a view: their consistent solutions where it has no validated one of its own.
- * From checked states.
+ * From checked estimates.
  */
-skep_status skep_steps_propagate(const struct skep_steps *steps,
-                                 uint32_t step,
-                                 uint32_t view,
-                                 const struct skep_state *const *states,
-                                 size_t state_count,
-                                 struct skep_offers **offers_out);
+skep_status skep_stepper_propagate(const struct skep_stepper *stepper,
+                                   uint32_t cycle,
+                                   uint32_t view,
+                                   const struct skep_estimate *const *estimates,
+                                   size_t estimate_count,
+                                   struct skep_candidates **candidates_out);
 
 /**
- * Destroys offers; NULL is ignored.
+ * Destroys candidates; NULL is ignored.
  */
-void skep_offers_destroy(struct skep_offers *offers);
+void skep_candidates_destroy(struct skep_candidates *candidates);
 
 /**
- * Searches a view for one cycle: from its own state, helped by what is validated in its sources and by what is offered.
- * Without a state of its own it starts at random. From checked states on the step's scale; gives one that is still to
- * be checked. When it is cancelled or fails, `state_out` is not written.
+ * Searches a view for one cycle: from its own estimate, helped by what is validated in its sources and by what is offered.
+ * Without a estimate of its own it starts at random. From checked estimates on the step's scale; gives one that is still to
+ * be checked. When it is cancelled or fails, `estimate_out` is not written.
  */
-skep_status skep_steps_search(const struct skep_steps *steps,
-                              uint32_t step,
-                              uint32_t view,
-                              const struct skep_state *const *states,
-                              size_t state_count,
-                              const struct skep_offers *offers_or_null,
-                              skep_progress_fn progress_or_null,
-                              void *user,
-                              struct skep_state **state_out);
+skep_status skep_stepper_search(const struct skep_stepper *stepper,
+                                uint32_t cycle,
+                                uint32_t view,
+                                const struct skep_estimate *const *estimates,
+                                size_t estimate_count,
+                                const struct skep_candidates *candidates_or_null,
+                                skep_progress_fn progress_or_null,
+                                void *user,
+                                struct skep_estimate **estimate_out);
 
 /**
- * Checks a view's solutions against what its sources have just found, and gives its state with the verdicts in it. From
- * states that skep_steps_search gave; a source whose state is NULL cannot speak.
+ * Checks a view's solutions against what its sources have just found, and gives its estimate with the verdicts in it. From
+ * estimates that skep_stepper_search gave; a source whose estimate is NULL cannot speak.
  */
-skep_status skep_steps_check(const struct skep_steps *steps,
-                             uint32_t step,
-                             uint32_t view,
-                             const struct skep_state *const *states,
-                             size_t state_count,
-                             struct skep_state **state_out);
-
-/**
- * A checked state on the next finer scale, that of `step`: each pixel gets the plane of its coarse pixel.
- */
-skep_status skep_steps_hand_up(const struct skep_steps *steps,
-                               uint32_t step,
+skep_status skep_stepper_check(const struct skep_stepper *stepper,
+                               uint32_t cycle,
                                uint32_t view,
-                               const struct skep_state *state,
-                               struct skep_state **state_out);
+                               const struct skep_estimate *const *estimates,
+                               size_t estimate_count,
+                               struct skep_estimate **estimate_out);
 
 /**
- * The step to take after `step` was taken for all views; SKEP_STEP_NONE after the last. A scale ends early when too
- * few pixels of the given states, which are checked ones of `step`, changed (option "stop_share").
+ * A checked estimate on the next finer scale, that of `step`: each pixel gets the plane of its coarse pixel.
  */
-skep_status skep_steps_next(const struct skep_steps *steps,
-                            uint32_t step,
-                            const struct skep_state *const *states,
-                            size_t state_count,
-                            uint32_t *next_out);
+skep_status skep_stepper_upsample(const struct skep_stepper *stepper,
+                                  uint32_t cycle,
+                                  uint32_t view,
+                                  const struct skep_estimate *estimate,
+                                  struct skep_estimate **estimate_out);
 
 /**
- * Averages planes with those of the source views, closes small gaps, and settles source views, cost and outcome of
- * every pixel of a view after the last step, from checked states. The result holds this view alone, under its own
+ * The step to take after `step` was taken for all views; SKEP_CYCLE_NONE after the last. A scale ends early when too
+ * few pixels of the given estimates, which are checked ones of `step`, changed (option "stop_share").
+ */
+skep_status skep_stepper_next(const struct skep_stepper *stepper,
+                              uint32_t cycle,
+                              const struct skep_estimate *const *estimates,
+                              size_t estimate_count,
+                              uint32_t *next_out);
+
+/**
+ * Averages planes with those of the source views, closes small gaps, and settles source views, cost and status of
+ * every pixel of a view after the last step, from checked estimates. The result holds this view alone, under its own
  * number.
  */
-skep_status skep_steps_finish(const struct skep_steps *steps,
-                              uint32_t view,
-                              const struct skep_state *const *states,
-                              size_t state_count,
-                              skep_progress_fn progress_or_null,
-                              void *user,
-                              struct skep_result **result_out);
+skep_status skep_stepper_finish(const struct skep_stepper *stepper,
+                                uint32_t view,
+                                const struct skep_estimate *const *estimates,
+                                size_t estimate_count,
+                                skep_progress_fn progress_or_null,
+                                void *user,
+                                struct skep_result **result_out);
 
 /**
- * Makes a state from the caller's own maps, as if it had been checked in `step`. The maps have the size that
- * skep_steps_get_size tells for that step: `depth` in world units, 0 for none; `normal` unit x, y, z in the camera
+ * Makes a estimate from the caller's own maps, as if it had been checked in `step`. The maps have the size that
+ * skep_stepper_get_size tells for that step: `depth` in world units, 0 for none; `normal` unit x, y, z in the camera
  * frame, facing the camera, where there is a depth. `validated_or_null`: one byte a pixel, not 0 where the solution
  * counts as validated; NULL validates all that have a depth. `cost_or_null`: at least 0, kept to a 256th, ranks what is
  * offered to other views; NULL is 0. Strides in bytes; those of NULL maps are ignored.
  */
-skep_status skep_state_from_maps(const struct skep_steps *steps,
-                                 uint32_t step,
-                                 uint32_t view,
-                                 const float *depth,
-                                 size_t depth_stride_bytes,
-                                 const float *normal,
-                                 size_t normal_stride_bytes,
-                                 const uint8_t *validated_or_null,
-                                 size_t validated_stride_bytes,
-                                 const float *cost_or_null,
-                                 size_t cost_stride_bytes,
-                                 struct skep_state **state_out);
+skep_status skep_estimate_from_maps(const struct skep_stepper *stepper,
+                                    uint32_t cycle,
+                                    uint32_t view,
+                                    const float *depth,
+                                    size_t depth_stride_bytes,
+                                    const float *normal,
+                                    size_t normal_stride_bytes,
+                                    const uint8_t *validated_or_null,
+                                    size_t validated_stride_bytes,
+                                    const float *cost_or_null,
+                                    size_t cost_stride_bytes,
+                                    struct skep_estimate **estimate_out);
 
 /**
- * Destroys a state; NULL is ignored.
+ * Destroys a estimate; NULL is ignored.
  */
-void skep_state_destroy(struct skep_state *state);
+void skep_estimate_destroy(struct skep_estimate *estimate);
 
 /**
- * What a state is.
+ * What a estimate is.
  */
-skep_status skep_state_get_info(const struct skep_state *state, struct skep_state_info *info_out);
+skep_status skep_estimate_get_info(const struct skep_estimate *estimate, struct skep_estimate_info *info_out);
 
 /**
- * Copies a state's maps, row after row without gaps, `capacity` pixels of room in each: `depth` (1 float a pixel, 0
+ * Copies a estimate's maps, row after row without gaps, `capacity` pixels of room in each: `depth` (1 float a pixel, 0
  * where there is none), `normal` (3 floats), `cost` (1 float, the aggregated cost of the search, to a
  * 256th), `validated` (1 byte, 1 where the check validated the solution). Any of them may be NULL.
  */
-skep_status skep_state_get_maps(const struct skep_state *state,
-                                float *depth,
-                                float *normal,
-                                float *cost,
-                                uint8_t *validated,
-                                size_t capacity);
+skep_status skep_estimate_get_maps(const struct skep_estimate *estimate,
+                                   float *depth,
+                                   float *normal,
+                                   float *cost,
+                                   uint8_t *validated,
+                                   size_t capacity);
 
 /**
- * Saves a state as bytes, to keep it or to send it to another machine. `size_out` receives how many there are; with
+ * Saves a estimate as bytes, to keep it or to send it to another machine. `size_out` receives how many there are; with
  * `buffer` NULL nothing else happens.
  *
  * SKEP_ERR_CAPACITY: they do not fit into `capacity`.
  */
-skep_status skep_state_save(const struct skep_state *state,
-                            uint8_t *buffer,
-                            size_t capacity,
-                            size_t *size_out);
+skep_status skep_estimate_save(const struct skep_estimate *estimate,
+                               uint8_t *buffer,
+                               size_t capacity,
+                               size_t *size_out);
 
 /**
- * Loads a state that was saved by the same version of the library, for steps of the same scene and options.
+ * Loads a estimate that was saved by the same version of the library, for stepper of the same scene and options.
  *
- * SKEP_ERR_ARGUMENT: bytes that are no state, are cut or too many, or do not fit the steps.
+ * SKEP_ERR_ARGUMENT: bytes that are no estimate, are cut or too many, or do not fit the stepper.
  */
-skep_status skep_state_load(const struct skep_steps *steps,
-                            const uint8_t *bytes,
-                            size_t size,
-                            struct skep_state **state_out);
+skep_status skep_estimate_load(const struct skep_stepper *stepper,
+                               const uint8_t *bytes,
+                               size_t size,
+                               struct skep_estimate **estimate_out);
 
 /**
  * The plane with this unit normal through the point at `depth` behind a pixel, which need not be whole.
@@ -1181,38 +1146,39 @@ skep_status skep_plane_homographies(const struct skep_camera *reference,
                                     double *homographies);
 
 /**
- * Copies an image into the layout the kernels sample; colours become grey as in skep_scene_add_view.
+ * Copies an image into the layout the kernels sample; colors become gray as in skep_scene_add_view.
  */
-skep_status skep_samples_create(const struct skep_image *image, struct skep_samples **samples_out);
+skep_status skep_packed_image_create(const struct skep_image *image,
+                                     struct skep_packed_image **packed_image_out);
 
 /**
  * Destroys samples; NULL is ignored.
  */
-void skep_samples_destroy(struct skep_samples *samples);
+void skep_packed_image_destroy(struct skep_packed_image *packed_image);
 
 /**
  * Makes a square window of half side `radius` (1 to 16), sampled every `step` pixels (1 to 8). A sample weighs
- * exp(-r^2 / (2 spatial_sigma^2) - dI^2 / (2 colour_sigma^2)), with r its distance from the centre in pixels and dI its
- * difference in grey from it, of [0, 1]; INFINITY for both sigmas weighs all samples alike. `min_variance`: weighted
- * variance, of grey in [0, 1], under which a patch has no texture; 1e-5 suits photographs.
+ * exp(-r^2 / (2 sigma_spatial^2) - dI^2 / (2 sigma_color^2)), with r its distance from the center in pixels and dI its
+ * difference in gray from it, of [0, 1]; INFINITY for both sigmas weighs all samples alike. `min_variance`: weighted
+ * variance, of gray in [0, 1], under which a patch has no texture; 1e-5 suits photographs.
  *
- * The instruction set is the one skep_backend_name tells when the window is made.
+ * The instruction set is the one skep_simd_level_name tells when the window is made.
  */
-skep_status skep_window_create(uint32_t radius,
-                               uint32_t step,
-                               double spatial_sigma,
-                               double colour_sigma,
-                               double min_variance,
-                               struct skep_window **window_out);
+skep_status skep_ncc_window_create(uint32_t radius,
+                                   uint32_t step,
+                                   double sigma_spatial,
+                                   double sigma_color,
+                                   double min_variance,
+                                   struct skep_ncc_window **ncc_window_out);
 
 /**
  * Destroys a window; NULL is ignored.
  */
-void skep_window_destroy(struct skep_window *window);
+void skep_ncc_window_destroy(struct skep_ncc_window *window);
 
 /**
- * Normalised cross-correlations of patches of the reference with their images in a source view: `pixels` holds x, y of
- * each patch's centre in the reference (2 * count), `homographies` the way of each from reference to source pixels (9
+ * Normalized cross-correlations of patches of the reference with their images in a source view: `pixels` holds x, y of
+ * each patch's center in the reference (2 * count), `homographies` the way of each from reference to source pixels (9
  * doubles each, row by row), `ncc` has room for count floats. -1 to 1; -1 also where either side has no texture. Samples
  * outside the reference weigh nothing, those outside the source repeat its border. The source is interpolated bilinearly
  * at places in 256ths of a pixel, so an NCC differs from the exact one by some 1e-4.
@@ -1220,9 +1186,9 @@ void skep_window_destroy(struct skep_window *window);
  * Patches that follow each other at the same pixel share the reference's side: sort them so. Stateless: any number of
  * threads, no allocation.
  */
-skep_status skep_patch_ncc(const struct skep_window *window,
-                           const struct skep_samples *reference,
-                           const struct skep_samples *source,
+skep_status skep_patch_ncc(const struct skep_ncc_window *window,
+                           const struct skep_packed_image *reference,
+                           const struct skep_packed_image *source,
                            const uint32_t *pixels,
                            const double *homographies,
                            size_t count,
@@ -1263,11 +1229,10 @@ skep_status skep_result_write_workspace(const struct skep_result *result,
                                         const char *folder);
 
 /**
- * Writes a cloud as binary PLY (x, y, z as floats, normals, colours), and the views of each point beside it in
+ * Writes a cloud as binary PLY (x, y, z as floats, normals, colors), and the views of each point beside it in
  * FILE.vis, as COLMAP does.
  */
-skep_status skep_cloud_write_ply(const struct skep_cloud *cloud,
-                                 const char *file);
+skep_status skep_cloud_write_ply(const struct skep_cloud *cloud, const char *file);
 
 /**
  * Writes a depth map in COLMAP's layout: width floats a row, `stride_bytes` from row to row.

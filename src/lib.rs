@@ -6,42 +6,39 @@
 #![deny(unsafe_code)]
 
 mod ambc;
-mod averaging;
-pub mod camera;
 #[cfg(feature = "capi")]
 mod capi;
-mod closing;
-mod consistency;
-mod edges;
+mod cross_view;
 mod error;
-mod filling;
 pub mod fusion;
+pub mod geometry;
 pub mod image;
 #[cfg(feature = "io")]
 pub mod io;
-pub mod kernels;
-mod maps;
+pub mod matching;
 mod options;
-mod outcome;
-mod padded;
-mod pool;
-mod progress;
-mod propagation;
+mod parallel;
+mod pipeline;
+mod refine;
 mod scene;
 pub mod simd;
-mod smoothing;
-mod solve;
-mod state;
 #[cfg(test)]
 mod testing;
-pub mod views;
+pub mod view_selection;
 
+pub use ambc::Counts;
 pub use error::{Error, Result};
-pub use maps::{Counts, CycleRecord, Maps, Outcome, PointCloud, PointViews, Reconstruction, ViewResult};
-pub use options::{Aggregation, FusionOptions, Options, Scale};
-pub use progress::{Hook, Phase, Progress, ignore_progress};
-pub use scene::{DepthRange, Scene, SparsePoint, View};
-pub use solve::{Offers, OwnMaps, State, Step, Steps, Verdicts, reconstruct};
+pub use fusion::{PointCloud, PointViews};
+pub use geometry::DepthRange;
+pub use options::{
+    CheckOptions, CostOptions, FusionOptions, Kind, OptionInfo, OptionValue, Options, RefineOptions, Scale,
+    ScheduleOptions, SearchOptions, ViewSelectionOptions, WindowOptions,
+};
+pub use pipeline::{
+    Candidates, Cycle, CycleRecord, Hook, OwnMaps, Phase, Progress, Reconstruction, Stepper, Verdicts,
+    ViewEstimate, ViewResult, ignore_progress, reconstruct,
+};
+pub use scene::{Maps, PixelStatus, Scene, SparsePoint, View};
 
 #[doc = include_str!("how_it_works.md")]
 pub mod how_it_works {}

@@ -2,12 +2,15 @@
 //! everything is known exactly.
 
 use crate::ambc::Random;
-use crate::camera::{Camera, Plane};
+use crate::geometry::DepthRange;
+use crate::geometry::ViewSets;
+use crate::geometry::{Camera, Plane};
 use crate::image::{PackedImage, Picture};
-use crate::kernels::Window;
-use crate::scene::DepthRange;
-use crate::state::{Solution, ViewState};
-use crate::views::{Reference, ShownPlane, Source, ViewSets};
+use crate::matching::Window;
+use crate::matching::{Problem, Source};
+use crate::options::Options;
+use crate::scene::CompactPlane;
+use crate::scene::{PixelEstimate, PlaneMap};
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
 /// The wall's depths lie well inside.
@@ -18,7 +21,7 @@ pub struct World {
     pub cameras: Vec<Camera>,
     pub images: Vec<PackedImage>,
     /// The validated solutions the sources show; none at first.
-    pub surfaces: Vec<Vec<ShownPlane>>,
+    pub surfaces: Vec<Vec<CompactPlane>>,
 }
 
 /// Unit normal of the wall, which goes through (0, 0, 5).
@@ -26,8 +29,8 @@ fn wall_normal() -> DVec3 {
     DVec3::new(0.2, 0.1, -1.0).normalize()
 }
 
-/// Grey value of the wall's texture.
-pub fn grey(point: DVec3) -> u8 {
+/// Gray value of the wall's texture.
+pub fn gray(point: DVec3) -> u8 {
     let waves = (7.0 * point.x + 3.0 * point.y).sin() + (5.0 * point.y - 3.0 * point.x + 1.0).sin();
     (127.0 + 55.0 * waves).round() as u8
 }
@@ -60,15 +63,15 @@ pub fn normal(camera: &Camera) -> Vec3 {
 }
 
 /// The wall at every pixel, each solution consistent with one source and not validated, at a cost of 0.1.
-pub fn exact(camera: &Camera) -> ViewState {
-    let solution = |pixel| Solution {
+pub fn exact(camera: &Camera) -> PlaneMap {
+    let solution = |pixel| PixelEstimate {
         depth: depth(camera, pixel),
         normal: normal(camera),
         cost: 0.1.into(),
         consistent: 1,
         validated: false,
     };
-    ViewState { solutions: (0..camera.pixels()).map(solution).collect(), ..ViewState::default() }
+    PlaneMap { solutions: (0..camera.pixels()).map(solution).collect(), ..PlaneMap::default() }
 }
 
 /// A camera at `x` on a line parallel to the wall's foot, turned so that it sees the same part of the wall.
@@ -92,8 +95,8 @@ impl World {
         let cameras: Vec<Camera> = places.iter().map(|&x| camera(x, size)).collect();
         let image = |camera: &Camera| {
             let point = |pixel| camera.unproject(place(camera, pixel), f64::from(depth(camera, pixel)));
-            let greys = (0..camera.pixels()).map(|pixel| grey(point(pixel))).collect();
-            PackedImage::new(&Picture::from_grey(size.0, size.1, greys).unwrap())
+            let grays = (0..camera.pixels()).map(|pixel| gray(point(pixel))).collect();
+            PackedImage::new(&Picture::from_gray(size.0, size.1, grays).unwrap())
         };
         World {
             images: cameras.iter().map(image).collect(),
@@ -108,8 +111,8 @@ impl World {
     }
 
     /// The first view with all others as sources.
-    pub fn reference(&self) -> Reference<'_> {
-        let mut reference = Reference::new(&self.cameras[0], &self.images[0], RANGE);
+    pub fn reference(&self) -> Problem<'_> {
+        let mut reference = Problem::new(&self.cameras[0], &self.images[0], RANGE);
         for view in 1..self.cameras.len() {
             let (image, surface) = (&self.images[view], &self.surfaces[view]);
             reference.sources.push(Source::new(&self.cameras[0], &self.cameras[view], image, surface));
@@ -117,15 +120,38 @@ impl World {
         reference
     }
 
-    /// The exact states of all views; the reference's pixels have all sources in their sets.
-    pub fn exact(&self) -> Vec<ViewState> {
-        let mut states: Vec<ViewState> = self.cameras.iter().map(exact).collect();
-        states[0].sets = ViewSets::full(self.cameras[0].pixels(), self.cameras.len() - 1);
-        states
+    /// The exact maps of all views; the reference's pixels have all sources in their sets.
+    pub fn exact(&self) -> Vec<PlaneMap> {
+        let mut maps: Vec<PlaneMap> = self.cameras.iter().map(exact).collect();
+        maps[0].sets = ViewSets::full(self.cameras[0].pixels(), self.cameras.len() - 1);
+        maps
     }
 }
 
 /// The window of the tests.
 pub fn window() -> Window {
     Window::new(5, 2, 5.0, 0.2, 1e-5)
+}
+
+/// A camera at `position` that looks at `target`, the x axis of its image horizontal.
+pub fn looking_at(position: DVec3, target: DVec3, (width, height): (u32, u32), focal: f64) -> Camera {
+    let forward = (target - position).normalize();
+    let right = DVec3::Y.cross(forward).normalize();
+    let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
+    Camera {
+        width,
+        height,
+        fx: focal,
+        fy: focal,
+        cx: f64::from(width - 1) / 2.0,
+        cy: f64::from(height - 1) / 2.0,
+        rotation,
+        translation: -(rotation * position),
+    }
+}
+
+/// These options with a change.
+pub fn changed(mut options: Options, change: impl FnOnce(&mut Options)) -> Options {
+    change(&mut options);
+    options
 }

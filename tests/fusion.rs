@@ -2,11 +2,11 @@
 
 mod common;
 
-use common::procedural::{self, Procedural, Shape, Surface, Texture, pixel_centre};
+use common::procedural::{self, Procedural, Shape, Surface, Texture, pixel_center};
 use glam::{DVec2, DVec3};
-use skep::camera::Camera;
 use skep::fusion::{FusionView, fuse};
-use skep::{Error, FusionOptions, Maps, Outcome, Phase, PointCloud, Progress, ignore_progress};
+use skep::geometry::Camera;
+use skep::{Error, FusionOptions, Maps, Phase, PixelStatus, PointCloud, Progress, ignore_progress};
 use std::ops::ControlFlow;
 use std::sync::Mutex;
 
@@ -21,7 +21,7 @@ fn fusion_views<'a>(made: &'a Procedural, maps: &'a [Maps], overlap: &'a [Vec<u3
     let view = |index: usize| FusionView {
         camera: &made.views[index].camera,
         maps: &maps[index],
-        outcome: None,
+        status: None,
         picture: Some(&made.views[index].picture),
         overlap: &overlap[index],
     };
@@ -70,7 +70,7 @@ fn exact_maps_become_points_on_the_surface() {
     let worst = cloud.positions.iter().map(|&point| error(&made, point)).fold(0.0, f64::max);
     assert!(worst < 5e-3, "{worst}");
     assert_eq!(cloud.positions.len(), cloud.normals.len());
-    assert_eq!(cloud.positions.len(), cloud.colours.len());
+    assert_eq!(cloud.positions.len(), cloud.colors.len());
     assert_eq!(cloud.positions.len(), cloud.views.len());
 }
 
@@ -190,14 +190,14 @@ fn normals_are_unit_and_point_the_surface_s_way_in_the_world() {
             *normal = glam::Vec3::from_array(tilted).normalize().to_array();
         }
     }
-    let Shape::Sphere { centre, .. } = made.surfaces[0].shape else { unreachable!() };
+    let Shape::Sphere { center, .. } = made.surfaces[0].shape else { unreachable!() };
     let Shape::Rectangle { right, down, .. } = made.surfaces[1].shape else { unreachable!() };
     let cloud = fuse_maps(&made, &maps, OPTIONS);
     let (mut single, mut fused) = (0.0, 0.0);
     for (&position, &normal) in cloud.positions.iter().zip(&cloud.normals) {
         let normal = DVec3::from_array(normal.map(f64::from));
         assert!((normal.length() - 1.0).abs() < 1e-5);
-        let outward = DVec3::from_array(position) - centre;
+        let outward = DVec3::from_array(position) - center;
         let truth = if outward.length() < 0.71 { outward.normalize() } else { -right.cross(down) };
         fused += normal.angle_between(truth) / cloud.normals.len() as f64;
     }
@@ -209,7 +209,7 @@ fn normals_are_unit_and_point_the_surface_s_way_in_the_world() {
 }
 
 #[test]
-fn colours_are_the_pictures_at_the_point_and_grey_without() {
+fn colors_are_the_pictures_at_the_point_and_gray_without() {
     let made = procedural::plane_and_sphere();
     let cloud = fuse_maps(&made, &made.truth, OPTIONS);
     let mut difference = 0.0;
@@ -218,7 +218,7 @@ fn colours_are_the_pictures_at_the_point_and_grey_without() {
         let (pixel, _) = view.camera.project(DVec3::from_array(position)).unwrap();
         let (column, row) = view.camera.nearest_pixel(pixel).unwrap();
         let seen = view.picture.rgb((row * view.camera.width + column) as usize);
-        difference += (0..3).map(|c| f64::from(seen[c].abs_diff(cloud.colours[point][c]))).sum::<f64>() / 3.0;
+        difference += (0..3).map(|c| f64::from(seen[c].abs_diff(cloud.colors[point][c]))).sum::<f64>() / 3.0;
     }
     assert!(difference / (cloud.positions.len() as f64) < 12.0, "{difference}");
 
@@ -226,7 +226,7 @@ fn colours_are_the_pictures_at_the_point_and_grey_without() {
     let mut views = fusion_views(&made, &made.truth, &overlap);
     views.iter_mut().for_each(|view| view.picture = None);
     let cloud = fuse(&views, &OPTIONS, &ignore_progress).unwrap();
-    assert!(cloud.colours.iter().all(|&colour| colour == [128; 3]));
+    assert!(cloud.colors.iter().all(|&color| color == [128; 3]));
 }
 
 #[test]
@@ -260,7 +260,7 @@ fn a_point_names_the_view_it_started_in_and_then_views_that_see_it() {
 
 /// The point a little nearer to the camera: its own surface must not hide it.
 fn before(position: [f64; 3], camera: &Camera) -> DVec3 {
-    DVec3::from_array(position).lerp(camera.centre(), 1e-3)
+    DVec3::from_array(position).lerp(camera.center(), 1e-3)
 }
 
 #[test]
@@ -340,11 +340,11 @@ fn only_what_is_validated_counts_where_outcomes_are_given() {
     let made = procedural::textureless_panel();
     let overlap = all_others(made.truth.len());
     let left_out = |pixel: usize| pixel.is_multiple_of(3);
-    let outcomes: Vec<Outcome> = (0..made.truth[0].depth.len())
-        .map(|pixel| if left_out(pixel) { Outcome::Inconsistent } else { Outcome::Validated })
+    let outcomes: Vec<PixelStatus> = (0..made.truth[0].depth.len())
+        .map(|pixel| if left_out(pixel) { PixelStatus::Inconsistent } else { PixelStatus::Validated })
         .collect();
     let mut with_outcomes = fusion_views(&made, &made.truth, &overlap);
-    with_outcomes.iter_mut().for_each(|view| view.outcome = Some(&outcomes));
+    with_outcomes.iter_mut().for_each(|view| view.status = Some(&outcomes));
     let mut without = made.truth.to_vec();
     for maps in &mut without {
         maps.depth
@@ -369,9 +369,9 @@ fn bad_input_is_named() {
     let short = Maps { depth: vec![1.0; 5], normal: made.truth[0].normal.clone() };
     let text = refused(FusionView { maps: &short, ..views[0] }, OPTIONS);
     assert!(text.contains("views[0].maps.depth is 5 values") && text.contains("12288"), "{text}");
-    let text = refused(FusionView { outcome: Some(&[Outcome::Validated; 5]), ..views[0] }, OPTIONS);
-    assert!(text.contains("views[0].outcome is 5 values") && text.contains("12288"), "{text}");
-    let small = skep::image::Picture::from_grey(2, 1, vec![0; 2]).unwrap();
+    let text = refused(FusionView { status: Some(&[PixelStatus::Validated; 5]), ..views[0] }, OPTIONS);
+    assert!(text.contains("views[0].status is 5 values") && text.contains("12288"), "{text}");
+    let small = skep::image::Picture::from_gray(2, 1, vec![0; 2]).unwrap();
     let text = refused(FusionView { picture: Some(&small), ..views[0] }, OPTIONS);
     assert!(text.contains("views[0].picture is 2x1") && text.contains("128x96"), "{text}");
     for overlap in [&[0][..], &[2], &[1, 1]] {
@@ -399,7 +399,7 @@ fn a_pixel_that_became_part_of_a_point_starts_none() {
     let first = starts(0);
     let camera = &made.views[0].camera;
     let seen = (0..camera.pixels()).filter(|&pixel| {
-        let position = camera.unproject(pixel_centre(camera, pixel), f64::from(made.truth[0].depth[pixel]));
+        let position = camera.unproject(pixel_center(camera, pixel), f64::from(made.truth[0].depth[pixel]));
         (1..9).filter(|&view| made.is_visible(before(position.to_array(), camera), view)).count() >= 3
     });
     let seen = seen.count();

@@ -6,7 +6,7 @@ use std::path::Path;
 /// The files of the interface in the order of the manual.
 const SECTIONS: [&str; 14] = [
     "status", "options", "camera", "image", "scene", "progress", "result", "borrow", "cloud", "fusion",
-    "steps", "state", "kernels", "files",
+    "stepper", "estimate", "kernels", "files",
 ];
 
 #[test]

@@ -2,8 +2,9 @@
 
 use glam::{DMat3, DQuat, DVec2, DVec3, EulerRot, Vec3};
 use proptest::prelude::*;
-use skep::camera::{Camera, Plane, plane_homography};
-use skep::kernels::{RelativePose, SlantedPlane};
+use skep::geometry::{Camera, Plane, plane_homography};
+use skep::geometry::{RelativePose, SlantedPlane};
+use skep::matching::PatchHomography;
 
 const WIDTH: u32 = 640;
 const HEIGHT: u32 = 480;
@@ -21,7 +22,7 @@ prop_compose! {
         position in prop::array::uniform3(-1.0..1.0f64),
     ) -> Camera {
         let rotation = DMat3::from_quat(DQuat::from_euler(EulerRot::XYZ, turn[0], turn[1], turn[2]));
-        let centre = DVec3::from_array(position) - 4.0 * DVec3::Z;
+        let center = DVec3::from_array(position) - 4.0 * DVec3::Z;
         Camera {
             width: WIDTH,
             height: HEIGHT,
@@ -30,7 +31,7 @@ prop_compose! {
             cx: principal[0] * f64::from(WIDTH),
             cy: principal[1] * f64::from(HEIGHT),
             rotation,
-            translation: -(rotation * centre),
+            translation: -(rotation * center),
         }
     }
 }
@@ -130,13 +131,13 @@ proptest! {
     }
 
     #[test]
-    fn the_homography_about_a_pixel_takes_its_neighbours_where_they_project(case in case()) {
+    fn the_homography_about_a_pixel_takes_its_neighbors_where_they_project(case in case()) {
         let Some(target) = case.target(case.pixel + case.offset) else { return Ok(()) };
         let pose = RelativePose::new(&case.reference, &case.source);
         let at_infinity = pose.at_infinity(case.pixel.x as f32, case.pixel.y as f32);
-        let homography = pose.homography(at_infinity, &case.slanted_plane());
+        let homography = PatchHomography::of_plane(&pose, at_infinity, &case.slanted_plane());
         let (dx, dy) = (case.offset.x as f32, case.offset.y as f32);
-        let mapped = homography.centre + homography.along_x * dx + homography.along_y * dy;
+        let mapped = homography.center + homography.along_x * dx + homography.along_y * dy;
         prop_assert!(distance_of(mapped, target) < F32_PIXELS);
     }
 
@@ -157,7 +158,7 @@ proptest! {
     }
 
     #[test]
-    fn halving_puts_the_centre_of_a_coarse_pixel_between_four_fine_ones(
+    fn halving_puts_the_center_of_a_coarse_pixel_between_four_fine_ones(
         camera in camera(),
         pixel in prop::array::uniform2(0.0..400.0f64),
         depth in 1.0..9.0f64,
@@ -187,7 +188,7 @@ fn an_odd_side_is_rounded_up_when_halved() {
 }
 
 #[test]
-fn nothing_projects_from_behind_the_camera_and_pixels_end_half_a_pixel_beyond_their_centre() {
+fn nothing_projects_from_behind_the_camera_and_pixels_end_half_a_pixel_beyond_their_center() {
     let camera = Camera {
         width: 4,
         height: 3,

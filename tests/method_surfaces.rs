@@ -2,19 +2,27 @@
 
 mod common;
 
+use common::changed;
 use common::measure::{Share, normal_error, share_right};
 use common::procedural::{self, Procedural};
-use skep::{Options, Outcome, Reconstruction, ignore_progress, reconstruct};
+use skep::{Options, PixelStatus, Reconstruction, ignore_progress, reconstruct};
 
 fn run(made: &Procedural, options: Options) -> Reconstruction {
-    reconstruct(&made.scene(), &Options { threads: 2, ..options }, &ignore_progress).unwrap()
+    reconstruct(
+        &made.scene(),
+        &changed(options, |o| {
+            o.threads = 2;
+        }),
+        &ignore_progress,
+    )
+    .unwrap()
 }
 
 /// Pixels of the panel whose window holds nothing else.
 fn is_inside_panel(made: &Procedural, view: usize, pixel: usize) -> bool {
     let width = made.views[view].camera.width as usize;
     let on_panel = |pixel: usize| made.hit(view, pixel).is_some_and(|hit| hit.surface == procedural::PANEL);
-    let margin = Options::default().window_radius as usize + 1;
+    let margin = Options::default().window.window_radius as usize + 1;
     on_panel(pixel)
         && [margin, margin * width].iter().all(|step| on_panel(pixel - step) && on_panel(pixel + step))
 }
@@ -29,7 +37,7 @@ fn a_panel_that_shows_nothing_but_noise_continues_the_wall_around_it() {
             for pixel in 0..truth.depth.len() {
                 if is_inside_panel(&made, index, pixel) {
                     let off = (view.estimate.depth[pixel] / truth.depth[pixel] - 1.0).abs();
-                    share.add(view.outcome[pixel] == Outcome::Validated && off < 0.01);
+                    share.add(view.status[pixel] == PixelStatus::Validated && off < 0.01);
                 }
             }
         }
@@ -38,26 +46,28 @@ fn a_panel_that_shows_nothing_but_noise_continues_the_wall_around_it() {
     let all = recovered(Options::default());
     assert!(all.count > 500, "{all:?}");
     assert!(all.value() > 0.9, "{} of the panel is validated and right", all.value());
-    // Smoothness, reward, fitted planes, cheap neighbours, edges and other views carry planes into so small a panel too:
+    // Smoothness, reward, fitted planes, cheap neighbors, edges and other views carry planes into so small a panel too:
     // without them filling is alone, but for the coarser scale, where the panel is smaller still.
-    let alone = Options {
-        reward: 0.0,
-        smoothness: 0.0,
-        plane_fit: 0.0,
-        neighbours_drawn: 1,
-        edge_passes: 0,
-        propagation: false,
-        ..Options::default()
-    };
+    let alone = changed(Options::default(), |o| {
+        o.search.smoothness_reward = 0.0;
+        o.cost.smoothness_weight = 0.0;
+        o.search.local_plane_tolerance = 0.0;
+        o.search.onlooker_tournament_size = 1;
+        o.refine.fattening_passes = 0;
+        o.search.view_propagation = false;
+    });
     let with = recovered(alone.clone()).value();
-    let without = recovered(Options { noise_ratio: 0.0, ..alone }).value();
+    let without = recovered(changed(alone, |o| {
+        o.window.min_texture_to_noise = 0.0;
+    }))
+    .value();
     assert!(with > 0.9 && without < with - 0.1, "{with} with filling alone and {without} without it");
 }
 
 /// Of all pixels, and of those that are validated, the ones validated within half a percent of the truth.
 fn right_depths(made: &Procedural, options: Options) -> (Share, Share) {
     let result = run(made, options);
-    let is_validated = |view: usize, pixel: usize| result.views[view].outcome[pixel] == Outcome::Validated;
+    let is_validated = |view: usize, pixel: usize| result.views[view].status[pixel] == PixelStatus::Validated;
     let maps = || result.views.iter().zip(&made.truth).map(|(view, truth)| (&view.estimate, truth));
     let of_validated = share_right(maps(), 0.005, is_validated);
     let count = share_right(maps(), 0.005, |_, _| true).count;
@@ -68,8 +78,12 @@ fn right_depths(made: &Procedural, options: Options) -> (Share, Share) {
 fn closing_gaps_completes_surfaces_without_wrong_ones() {
     let made = procedural::plane_and_sphere().only(&[1, 3, 4, 5, 7]);
     let (complete, right) = right_depths(&made, Options::default());
-    let (complete_without, right_without) =
-        right_depths(&made, Options { close_gaps: false, ..Options::default() });
+    let (complete_without, right_without) = right_depths(
+        &made,
+        changed(Options::default(), |o| {
+            o.refine.fill_gaps = false;
+        }),
+    );
     let (with, without) = (complete.value(), complete_without.value());
     assert!(with > without + 0.005, "{with} of the pixels are right with closed gaps, {without} without");
     assert!(
@@ -85,7 +99,7 @@ fn median_errors(made: &Procedural, options: Options) -> (f64, f64) {
     let result = run(made, options);
     let (mut depths, mut normals) = (Vec::new(), Vec::new());
     for (view, truth) in result.views.iter().zip(&made.truth) {
-        for pixel in (0..truth.depth.len()).filter(|&pixel| view.outcome[pixel] == Outcome::Validated) {
+        for pixel in (0..truth.depth.len()).filter(|&pixel| view.status[pixel] == PixelStatus::Validated) {
             let off = f64::from(view.estimate.depth[pixel]) / f64::from(truth.depth[pixel]) - 1.0;
             depths.push(off.abs());
             normals.push(normal_error(&view.estimate, truth, pixel));
@@ -106,8 +120,12 @@ fn median_normal_error(made: &Procedural, options: Options) -> f64 {
 fn averaging_between_views_makes_depths_and_normals_more_exact() {
     let made = procedural::plane_and_sphere().only(&[1, 3, 4, 5, 7]);
     let (depth, normal) = median_errors(&made, Options::default());
-    let (own_depth, own_normal) =
-        median_errors(&made, Options { average_views: false, ..Options::default() });
+    let (own_depth, own_normal) = median_errors(
+        &made,
+        changed(Options::default(), |o| {
+            o.refine.cross_view_averaging = false;
+        }),
+    );
     assert!(depth < 0.9 * own_depth, "{depth} with averaging and {own_depth} without");
     assert!(normal < 0.9 * own_normal, "{normal} degrees with averaging and {own_normal} without");
 }
@@ -116,7 +134,12 @@ fn averaging_between_views_makes_depths_and_normals_more_exact() {
 fn smoothing_makes_normals_more_exact() {
     let made = procedural::plane_and_sphere().only(&[1, 3, 4, 5, 7]);
     let with = median_normal_error(&made, Options::default());
-    let without = median_normal_error(&made, Options { smoothing_passes: 0, ..Options::default() });
+    let without = median_normal_error(
+        &made,
+        changed(Options::default(), |o| {
+            o.refine.smoothing_passes = 0;
+        }),
+    );
     assert!(with < 0.8 * without, "{with} degrees with smoothing and {without} without");
 }
 
@@ -124,8 +147,15 @@ fn smoothing_makes_normals_more_exact() {
 fn planes_fitted_to_depths_make_normals_more_exact() {
     let made = procedural::plane_and_sphere().only(&[1, 3, 4, 5, 7]);
     // Smoothing averages normals too.
-    let plain = Options { smoothing_passes: 0, ..Options::default() };
+    let plain = changed(Options::default(), |o| {
+        o.refine.smoothing_passes = 0;
+    });
     let with = median_normal_error(&made, plain.clone());
-    let without = median_normal_error(&made, Options { plane_fit: 0.0, ..plain });
+    let without = median_normal_error(
+        &made,
+        changed(plain, |o| {
+            o.search.local_plane_tolerance = 0.0;
+        }),
+    );
     assert!(with < 0.8 * without, "{with} degrees with fitted planes and {without} without");
 }

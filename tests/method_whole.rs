@@ -2,12 +2,13 @@
 
 mod common;
 
+use common::changed;
 use common::measure::{Share, normal_error, share_right};
-use common::procedural::{self, MIDDLE, Procedural, Shape, Surface, Texture, looking_at, pixel_centre};
+use common::procedural::{self, MIDDLE, Procedural, Shape, Surface, Texture, looking_at, pixel_center};
 use glam::{DVec2, DVec3};
-use skep::simd::Level;
+use skep::simd::SimdLevel;
 use skep::{
-    DepthRange, Error, Maps, Options, Outcome, Phase, Progress, Reconstruction, Scale, ViewResult,
+    DepthRange, Error, Maps, Options, Phase, PixelStatus, Progress, Reconstruction, Scale, ViewResult,
     ignore_progress, reconstruct,
 };
 use std::ops::ControlFlow;
@@ -17,7 +18,9 @@ use std::sync::Mutex;
 const RIGHT: f64 = 0.01;
 
 fn options() -> Options {
-    Options { threads: 2, ..Options::default() }
+    changed(Options::default(), |o| {
+        o.threads = 2;
+    })
 }
 
 fn run(made: &Procedural, options: &Options) -> Reconstruction {
@@ -28,7 +31,7 @@ fn run(made: &Procedural, options: &Options) -> Reconstruction {
         assert_eq!(view.estimate.depth.len(), pixels);
         assert_eq!(view.estimate.normal.len(), pixels);
         assert_eq!(view.cost.len(), pixels);
-        assert_eq!(view.outcome.len(), pixels);
+        assert_eq!(view.status.len(), pixels);
     }
     result
 }
@@ -43,7 +46,7 @@ fn share_right_of_estimates(
 }
 
 fn is_validated(result: &Reconstruction, view: usize, pixel: usize) -> bool {
-    result.views[view].outcome[pixel] == Outcome::Validated
+    result.views[view].status[pixel] == PixelStatus::Validated
 }
 
 #[test]
@@ -62,7 +65,7 @@ fn most_pixels_of_a_textured_scene_are_right() {
 
     let mut close_normals = Share::default();
     for (view, truth) in result.views.iter().zip(&made.truth) {
-        for pixel in (0..truth.depth.len()).filter(|&pixel| view.outcome[pixel] == Outcome::Validated) {
+        for pixel in (0..truth.depth.len()).filter(|&pixel| view.status[pixel] == PixelStatus::Validated) {
             close_normals.add(normal_error(&view.estimate, truth, pixel) < 20.0);
         }
     }
@@ -85,17 +88,19 @@ fn every_pixel_has_a_depth_in_range_a_unit_normal_and_a_reason() {
     let result = run(&made, &options());
     for (index, view) in result.views.iter().enumerate() {
         let (camera, range) = (&made.views[index].camera, scene.depth_range(index));
-        assert_eq!(view.outcome_counts().iter().sum::<u64>(), camera.pixels() as u64);
+        assert_eq!(view.status_counts().iter().sum::<u64>(), camera.pixels() as u64);
         for pixel in 0..camera.pixels() {
             let depth = f64::from(view.estimate.depth[pixel]);
             assert!((range.near * 0.999..=range.far * 1.001).contains(&depth), "depth {depth}");
             let normal = DVec3::from_array(view.estimate.normal[pixel].map(f64::from));
             assert!((normal.length() - 1.0).abs() < 1e-3);
-            assert!(normal.dot(camera.ray(pixel_centre(camera, pixel))) < 0.0, "a normal turns away");
+            assert!(normal.dot(camera.ray(pixel_center(camera, pixel))) < 0.0, "a normal turns away");
             assert!((0.0..=2.0).contains(&view.cost[pixel]), "cost {}", view.cost[pixel]);
         }
         assert!(view.sources.iter().all(|&source| source as usize != index && source < 5));
-        assert!(view.counts.ncc_evaluations > 0 && view.counts.samples > view.counts.ncc_evaluations);
+        assert!(
+            view.counts.ncc_evaluations > 0 && view.counts.bilinear_samples > view.counts.ncc_evaluations
+        );
         assert!(!view.cycles.is_empty());
     }
 }
@@ -117,9 +122,9 @@ fn set_shares(made: &Procedural, result: &Reconstruction) -> SetShares {
         visible_kept: Share::default(),
     };
     for (index, view) in result.views.iter().enumerate() {
-        for pixel in 0..view.outcome.len() {
+        for pixel in 0..view.status.len() {
             let hit = made.hit(index, pixel).unwrap();
-            if view.outcome[pixel] != Outcome::Validated || hit.surface == procedural::POST {
+            if view.status[pixel] != PixelStatus::Validated || hit.surface == procedural::POST {
                 continue;
             }
             for (place, &source) in view.sources.iter().enumerate() {
@@ -144,7 +149,15 @@ fn set_shares(made: &Procedural, result: &Reconstruction) -> SetShares {
 fn views_that_are_occluded_are_dropped_from_the_pixel_s_set() {
     let made = procedural::occluding_post();
     let with = set_shares(&made, &run(&made, &options()));
-    let without = set_shares(&made, &run(&made, &Options { view_selection: false, ..options() }));
+    let without = set_shares(
+        &made,
+        &run(
+            &made,
+            &changed(options(), |o| {
+                o.view_selection.pixelwise_view_selection = false;
+            }),
+        ),
+    );
 
     assert!(with.hidden_kept.count > 2_000, "{:?}", with.hidden_kept);
     assert!(with.hidden_kept.value() < 0.25, "{:?} of the hidden sources stay", with.hidden_kept);
@@ -166,16 +179,15 @@ fn is_inside_panel(made: &Procedural, view: usize, pixel: usize, margin: usize) 
 fn a_panel_without_texture_is_recovered_with_the_reward_or_smoothness_and_not_without_both() {
     let made = procedural::textureless_panel().only(&[1, 3, 4, 5, 7]);
     // Nothing else may carry planes inwards: neither coarser scales, where the panel is small, nor other views, nor filling.
-    let scale = Scale { halvings: 0, foods: 3, first_iterations: 6, cycles: 16, cycle_iterations: 1 };
-    let alone = Options {
-        scales: vec![scale],
-        stop_share: 0.0,
-        propagation: false,
-        geometric_weight: 0.0,
-        noise_ratio: 0.0,
-        ..options()
-    };
-    let margin = options().window_radius as usize + 1;
+    let scale = Scale { downscale: 1, food_sources: 3, first_iterations: 6, cycles: 16, cycle_iterations: 1 };
+    let alone = changed(options(), |o| {
+        o.schedule.scales = vec![scale];
+        o.schedule.min_changed_fraction = 0.0;
+        o.search.view_propagation = false;
+        o.cost.geom_consistency_weight = 0.0;
+        o.window.min_texture_to_noise = 0.0;
+    });
+    let margin = options().window.window_radius as usize + 1;
     let inside: Vec<Vec<bool>> = (0..made.views.len())
         .map(|view| {
             let pixels = 0..made.views[view].camera.pixels();
@@ -183,12 +195,20 @@ fn a_panel_without_texture_is_recovered_with_the_reward_or_smoothness_and_not_wi
         })
         .collect();
     let recovered = |reward: f64, smoothness: f64| {
-        let result = run(&made, &Options { reward, smoothness, ..alone.clone() });
+        let result = run(
+            &made,
+            &changed(alone.clone(), |o| {
+                o.search.smoothness_reward = reward;
+                o.cost.smoothness_weight = smoothness;
+            }),
+        );
         share_right_of_estimates(&made, &result, |view, pixel| inside[view][pixel])
     };
     let without = recovered(0.0, 0.0);
     assert!(without < 0.1, "{without} without both");
-    for (reward, smoothness) in [(options().reward, 0.0), (0.0, options().smoothness)] {
+    for (reward, smoothness) in
+        [(options().search.smoothness_reward, 0.0), (0.0, options().cost.smoothness_weight)]
+    {
         let with = recovered(reward, smoothness);
         assert!(with > 0.5, "{with} with reward {reward} and smoothness {smoothness}");
     }
@@ -204,7 +224,7 @@ fn assert_same_bits(one: &Reconstruction, other: &Reconstruction, what: &str) {
         let (normals, others) = (a.estimate.normal.as_flattened(), b.estimate.normal.as_flattened());
         assert!(bits(normals) == bits(others), "normals {what}");
         assert!(bits(&a.cost) == bits(&b.cost), "costs {what}");
-        assert!(a.outcome == b.outcome, "outcomes {what}");
+        assert!(a.status == b.status, "outcomes {what}");
         assert!(a.sources == b.sources && a.view_sets == b.view_sets, "sets {what}");
         assert_eq!(a.counts, b.counts);
         assert_eq!(a.cycles, b.cycles);
@@ -216,9 +236,19 @@ fn assert_same_bits(one: &Reconstruction, other: &Reconstruction, what: &str) {
 #[test]
 fn the_result_is_the_same_bits_for_any_number_of_threads() {
     let made = procedural::plane_and_sphere().only(&[1, 3, 4, 5]);
-    let one = run(&made, &Options { threads: 1, ..options() });
+    let one = run(
+        &made,
+        &changed(options(), |o| {
+            o.threads = 1;
+        }),
+    );
     for threads in [2, 5] {
-        let other = run(&made, &Options { threads, ..options() });
+        let other = run(
+            &made,
+            &changed(options(), |o| {
+                o.threads = threads;
+            }),
+        );
         assert_same_bits(&one, &other, &format!("on {threads} threads"));
     }
 }
@@ -226,9 +256,16 @@ fn the_result_is_the_same_bits_for_any_number_of_threads() {
 #[test]
 fn the_result_is_the_same_bits_on_every_instruction_set() {
     let made = procedural::plane_and_sphere().only(&[3, 4, 5]);
-    let on = |level: Level| run(&made, &Options { simd: Some(level), ..options() });
-    let scalar = on(Level::Scalar);
-    for level in Level::ALL.into_iter().filter(|level| level.is_available()) {
+    let on = |level: SimdLevel| {
+        run(
+            &made,
+            &changed(options(), |o| {
+                o.simd = Some(level);
+            }),
+        )
+    };
+    let scalar = on(SimdLevel::Scalar);
+    for level in SimdLevel::ALL.into_iter().filter(|level| level.is_available()) {
         assert_same_bits(&scalar, &on(level), &format!("on {}", level.name()));
     }
 }
@@ -236,7 +273,18 @@ fn the_result_is_the_same_bits_on_every_instruction_set() {
 #[test]
 fn another_seed_gives_other_bits() {
     let made = procedural::plane_and_sphere().only(&[3, 4, 5]);
-    let depth = |seed: u64| run(&made, &Options { seed, ..options() }).views[1].estimate.depth.clone();
+    let depth = |seed: u64| {
+        run(
+            &made,
+            &changed(options(), |o| {
+                o.seed = seed;
+            }),
+        )
+        .views[1]
+            .estimate
+            .depth
+            .clone()
+    };
     assert!(depth(0) != depth(1));
 }
 
@@ -264,16 +312,25 @@ fn the_hook_follows_the_run_and_stops_it_in_every_phase() {
 
 /// A run without any validated pixel or point, that says why.
 fn assert_ends_with_reasons(made: &Procedural) {
-    for options in [options(), Options { threads: 2, ..Options::paper() }] {
+    for options in [
+        options(),
+        changed(Options::paper(), |o| {
+            o.threads = 2;
+        }),
+    ] {
         let result = run(made, &options);
         assert!(result.points.positions.is_empty());
         assert!(!result.warnings.is_empty(), "nothing came out and nothing was said");
         for view in &result.views {
-            let reasons =
-                [Outcome::NoSources, Outcome::NoTexture, Outcome::Inconsistent, Outcome::OutOfRange];
-            assert!(view.outcome.iter().all(|outcome| reasons.contains(outcome)));
-            let without_sources = view.outcome.iter().filter(|&&o| o == Outcome::NoSources).count();
-            assert!(without_sources * 2 > view.outcome.len(), "{:?}", view.outcome_counts());
+            let reasons = [
+                PixelStatus::NoSources,
+                PixelStatus::NoTexture,
+                PixelStatus::Inconsistent,
+                PixelStatus::OutOfRange,
+            ];
+            assert!(view.status.iter().all(|status| reasons.contains(status)));
+            let without_sources = view.status.iter().filter(|&&o| o == PixelStatus::NoSources).count();
+            assert!(without_sources * 2 > view.status.len(), "{:?}", view.status_counts());
         }
     }
 }
@@ -286,10 +343,12 @@ fn two_views_run_to_an_end_and_say_why_nothing_is_validated() {
 #[test]
 fn two_views_are_enough_where_one_consistent_source_is() {
     let made = procedural::plane_and_sphere().only(&[0, 1]);
-    let mut options = Options { min_consistent: 1, ..options() };
+    let mut options = changed(options(), |o| {
+        o.check.min_consistent_views = 1;
+    });
     options.fusion.min_views = 1;
     let result = run(&made, &options);
-    let validated = result.views[0].outcome_counts()[0] as f64 / result.views[0].outcome.len() as f64;
+    let validated = result.views[0].status_counts()[0] as f64 / result.views[0].status.len() as f64;
     assert!(validated > 0.6, "{validated} of the pixels are validated");
     let right = share_right_of_estimates(&made, &result, |view, pixel| is_validated(&result, view, pixel));
     assert!(right > 0.85, "{right} of the validated pixels are right");
@@ -326,9 +385,9 @@ fn masked_pixels_get_no_estimate_but_serve_other_views() {
     let result = run(&made, &options());
 
     for pixel in 0..pixels {
-        assert_eq!(result.views[0].outcome[pixel], Outcome::Masked);
+        assert_eq!(result.views[0].status[pixel], PixelStatus::Masked);
         let view = &result.views[MIDDLE];
-        assert_eq!(view.outcome[pixel] == Outcome::Masked, is_masked(pixel));
+        assert_eq!(view.status[pixel] == PixelStatus::Masked, is_masked(pixel));
         assert_eq!(view.estimate.depth[pixel] > 0.0, !is_masked(pixel));
         if is_masked(pixel) {
             assert_eq!(view.estimate.normal[pixel], [0.0; 3]);

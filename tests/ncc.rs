@@ -3,32 +3,32 @@
 use glam::Vec3;
 use proptest::prelude::*;
 use skep::image::{PackedImage, Picture};
-use skep::kernels::{MAX_COST, PatchHomography, ReferencePatch, Window, patch_cost, patch_costs};
-use skep::simd::{Level, Simd, Task, dispatch};
+use skep::matching::{MAX_COST, PatchHomography, ReferencePatch, Window, patch_cost, patch_costs};
+use skep::simd::{Simd, SimdLevel, Task, dispatch};
 
 const WIDTH: u32 = 24;
 const HEIGHT: u32 = 18;
 
-/// The window of the tests: its half side is odd and the step even, so that the centre is no sample.
+/// The window of the tests: its half side is odd and the step even, so that the center is no sample.
 const RADIUS: i32 = 5;
 const STEP: usize = 2;
 const SPATIAL_SIGMA: f64 = 4.0;
-const COLOUR_SIGMA: f64 = 0.2;
+const COLOR_SIGMA: f64 = 0.2;
 const MIN_VARIANCE: f64 = 1e-5;
 
 fn window() -> Window {
-    Window::new(RADIUS as u32, STEP as u32, SPATIAL_SIGMA, COLOUR_SIGMA, MIN_VARIANCE)
+    Window::new(RADIUS as u32, STEP as u32, SPATIAL_SIGMA, COLOR_SIGMA, MIN_VARIANCE)
 }
 
-fn picture(grey: impl Fn(i32, i32) -> u8) -> Picture {
+fn picture(gray: impl Fn(i32, i32) -> u8) -> Picture {
     let pixels = (0..HEIGHT as i32).flat_map(|y| (0..WIDTH as i32).map(move |x| (x, y)));
-    Picture::from_grey(WIDTH, HEIGHT, pixels.map(|(x, y)| grey(x, y)).collect()).unwrap()
+    Picture::from_gray(WIDTH, HEIGHT, pixels.map(|(x, y)| gray(x, y)).collect()).unwrap()
 }
 
 /// Takes every pixel to the one at an offset.
 fn shift((x, y): (usize, usize), (dx, dy): (f32, f32)) -> PatchHomography {
-    let centre = Vec3::new(x as f32 + dx, y as f32 + dy, 1.0);
-    PatchHomography { centre, along_x: Vec3::X, along_y: Vec3::Y }
+    let center = Vec3::new(x as f32 + dx, y as f32 + dy, 1.0);
+    PatchHomography { center, along_x: Vec3::X, along_y: Vec3::Y }
 }
 
 /// What is compared with what.
@@ -56,7 +56,7 @@ impl Task for Cost<'_> {
                 patch.sample(simd, &window, &reference, *x, *y);
                 let cost = patch_cost(simd, &window, &patch, &source, homography);
                 // Beside others, in any lane, it is the same.
-                let other = PatchHomography { centre: homography.centre + Vec3::X, ..*homography };
+                let other = PatchHomography { center: homography.center + Vec3::X, ..*homography };
                 for (lane, wanted) in [(0, 0b1), (2, 0b1_1111), (3, 0b1010_1010), (7, u8::MAX)] {
                     let view = |index| {
                         assert!(wanted >> index & 1 != 0, "view {index} is not wanted");
@@ -80,8 +80,8 @@ impl Case {
 
     /// The cost, which must be the same bits on all back-ends.
     fn cost(&self) -> f32 {
-        let cost = dispatch(Level::Scalar, Cost(self));
-        for level in Level::ALL.into_iter().filter(|level| level.is_available()) {
+        let cost = dispatch(SimdLevel::Scalar, Cost(self));
+        for level in SimdLevel::ALL.into_iter().filter(|level| level.is_available()) {
             let other = dispatch(level, Cost(self));
             assert_eq!(other.to_bits(), cost.to_bits(), "{}: {other} instead of {cost}", level.name());
         }
@@ -89,8 +89,8 @@ impl Case {
     }
 }
 
-fn grey_at(picture: &Picture, x: usize, y: usize) -> f64 {
-    f64::from(picture.grey()[y * picture.width() as usize + x])
+fn gray_at(picture: &Picture, x: usize, y: usize) -> f64 {
+    f64::from(picture.gray()[y * picture.width() as usize + x])
 }
 
 /// At a place whose fractions are those of [`in_parts`].
@@ -99,8 +99,8 @@ fn bilinear(picture: &Picture, x: f64, y: f64) -> f64 {
     let (right, below) =
         ((column + 1).min(picture.width() as usize - 1), (row + 1).min(picture.height() as usize - 1));
     let (fx, fy) = (x.fract(), y.fract());
-    let top = grey_at(picture, column, row) * (1.0 - fx) + grey_at(picture, right, row) * fx;
-    let low = grey_at(picture, column, below) * (1.0 - fx) + grey_at(picture, right, below) * fx;
+    let top = gray_at(picture, column, row) * (1.0 - fx) + gray_at(picture, right, row) * fx;
+    let low = gray_at(picture, column, below) * (1.0 - fx) + gray_at(picture, right, below) * fx;
     top * (1.0 - fy) + low * fy
 }
 
@@ -134,7 +134,7 @@ struct Direct {
 /// The definition: weights from the reference, means, variances and covariance under them.
 fn direct(case: &Case) -> Direct {
     let Case { reference, source, pixel: (x, y), homography } = case;
-    let centre = grey_at(reference, *x, *y) / 255.0;
+    let center = gray_at(reference, *x, *y) / 255.0;
     let (mut samples, mut errors) = (Vec::new(), Vec::new());
     for dy in (-RADIUS..=RADIUS).step_by(STEP) {
         for dx in (-RADIUS..=RADIUS).step_by(STEP) {
@@ -143,18 +143,18 @@ fn direct(case: &Case) -> Direct {
                 continue;
             }
             let (dx, dy) = (f64::from(dx), f64::from(dy));
-            let PatchHomography { centre: c, along_x: h, along_y: v } = *homography;
+            let PatchHomography { center: c, along_x: h, along_y: v } = *homography;
             let terms = |c: f32, h: f32, v: f32| [f64::from(c), dx * f64::from(h), dy * f64::from(v)];
             let z = terms(c.z, h.z, v.z);
             let (source_x, error_x) = clamped(terms(c.x, h.x, v.x), z, WIDTH - 1);
             let (source_y, error_y) = clamped(terms(c.y, h.y, v.y), z, HEIGHT - 1);
 
-            let a = grey_at(reference, column as usize, row as usize) / 255.0;
+            let a = gray_at(reference, column as usize, row as usize) / 255.0;
             let b = bilinear(source, source_x, source_y) / 255.0;
             let space = (dx * dx + dy * dy) / (2.0 * SPATIAL_SIGMA * SPATIAL_SIGMA);
-            let colour = (a - centre).powi(2) / (2.0 * COLOUR_SIGMA * COLOUR_SIGMA);
-            samples.push(((-space - colour).exp(), a, b));
-            // Grey changes by at most its whole range from one pixel to the next.
+            let color = (a - center).powi(2) / (2.0 * COLOR_SIGMA * COLOR_SIGMA);
+            samples.push(((-space - color).exp(), a, b));
+            // Gray changes by at most its whole range from one pixel to the next.
             errors.push((error_x + error_y).min(1.0));
         }
     }
@@ -178,25 +178,25 @@ fn direct(case: &Case) -> Direct {
     }
 }
 
-/// Noise of some contrast around some grey.
+/// Noise of some contrast around some gray.
 fn noise() -> impl Strategy<Value = Picture> {
     let values = prop::collection::vec(0.0..1.0f64, (WIDTH * HEIGHT) as usize);
     (values, 0.0..255.0f64, 0.0..255.0f64).prop_map(|(values, a, b)| {
-        let grey = values.iter().map(|value| (a + (b - a) * value).round() as u8);
-        Picture::from_grey(WIDTH, HEIGHT, grey.collect()).unwrap()
+        let gray = values.iter().map(|value| (a + (b - a) * value).round() as u8);
+        Picture::from_gray(WIDTH, HEIGHT, gray.collect()).unwrap()
     })
 }
 
 prop_compose! {
     /// Homographies of all kinds: near the identity, strongly slanted, out of the image, behind the camera.
     fn homography()(
-        centre in (-10.0..34.0f32, -10.0..28.0f32),
+        center in (-10.0..34.0f32, -10.0..28.0f32),
         along_x in prop::array::uniform2(-1.5..1.5f32),
         along_y in prop::array::uniform2(-1.5..1.5f32),
         z in (prop_oneof![4 => 0.3..2.0f32, 1 => -1.0..1.0f32], -0.05..0.05f32, -0.05..0.05f32),
     ) -> PatchHomography {
         PatchHomography {
-            centre: Vec3::new(centre.0, centre.1, 1.0) * z.0,
+            center: Vec3::new(center.0, center.1, 1.0) * z.0,
             along_x: Vec3::new(along_x[0], along_x[1], z.1),
             along_y: Vec3::new(along_y[0], along_y[1], z.2),
         }
@@ -238,14 +238,14 @@ proptest! {
         let same = Case::new(reference.clone(), reference.clone(), (x, y), (0.0, 0.0));
         prop_assume!(direct(&same).variances[0] > 1.05 * MIN_VARIANCE);
         prop_assert!(same.cost() < 1e-5);
-        let inverted = reference.grey().iter().map(|grey| 255 - grey).collect();
-        let inverted = Picture::from_grey(WIDTH, HEIGHT, inverted).unwrap();
+        let inverted = reference.gray().iter().map(|gray| 255 - gray).collect();
+        let inverted = Picture::from_gray(WIDTH, HEIGHT, inverted).unwrap();
         let case = Case::new(reference, inverted, (x, y), (0.0, 0.0));
         prop_assert!(f64::from(case.cost()) > 2.0 - direct(&case).tolerance);
     }
 }
 
-/// Pixels that look random, in steps of four grey values so that half of it is exact.
+/// Pixels that look random, in steps of four gray values so that half of it is exact.
 fn texture(x: i32, y: i32) -> u8 {
     ((x * 7919 + y * 104_729 + x * y * 31) % 61).unsigned_abs() as u8 * 4
 }
@@ -299,7 +299,7 @@ fn without_texture_on_either_side_there_is_nothing_to_compare() {
 }
 
 #[test]
-fn a_grey_value_of_noise_is_no_texture_and_four_are() {
+fn a_gray_value_of_noise_is_no_texture_and_four_are() {
     // Stripes two pixels wide, which a window with step 2 sees in turn.
     let stripes = |height: u8| picture(move |x, _| 100 + height * (x / 2 % 2) as u8);
     let cost = |height| Case::new(stripes(height), stripes(height), (12, 9), (0.0, 0.0)).cost();
@@ -310,8 +310,8 @@ fn a_grey_value_of_noise_is_no_texture_and_four_are() {
 #[test]
 fn what_is_not_a_number_costs_the_most() {
     let textured = picture(texture);
-    for centre in [Vec3::NAN, Vec3::ZERO, Vec3::INFINITY] {
-        let homography = PatchHomography { centre, along_x: Vec3::ZERO, along_y: Vec3::ZERO };
+    for center in [Vec3::NAN, Vec3::ZERO, Vec3::INFINITY] {
+        let homography = PatchHomography { center, along_x: Vec3::ZERO, along_y: Vec3::ZERO };
         let case = Case { reference: textured.clone(), source: textured.clone(), pixel: (12, 9), homography };
         assert_eq!(case.cost(), MAX_COST);
     }
@@ -320,8 +320,8 @@ fn what_is_not_a_number_costs_the_most() {
 #[test]
 fn images_smaller_than_the_window_are_sampled_inside() {
     for (width, height) in [(1, 1), (1, 9), (9, 1), (2, 3)] {
-        let grey: Vec<u8> = (0..width * height).map(|pixel| (pixel * 53 % 200) as u8).collect();
-        let tiny = Picture::from_grey(width, height, grey).unwrap();
+        let gray: Vec<u8> = (0..width * height).map(|pixel| (pixel * 53 % 200) as u8).collect();
+        let tiny = Picture::from_gray(width, height, gray).unwrap();
         for pixel in 0..(width * height) as usize {
             let at = (pixel % width as usize, pixel / width as usize);
             let cost = Case::new(tiny.clone(), tiny.clone(), at, (0.0, 0.0)).cost();

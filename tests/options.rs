@@ -1,7 +1,7 @@
 //! Options that no run can be made with are refused by name.
 
-use skep::simd::Level;
-use skep::{Aggregation, Error, FusionOptions, Options, Scale};
+use skep::simd::SimdLevel;
+use skep::{Error, Options, Scale};
 
 #[test]
 fn the_presets_are_in_order_and_found_by_name() {
@@ -18,42 +18,46 @@ fn the_presets_are_in_order_and_found_by_name() {
 /// What spoils an option, and the option's name and the value in the error.
 type Spoiled = (fn(&mut Options), &'static str, &'static str);
 
+fn last_scale(options: &mut Options) -> &mut Scale {
+    options.schedule.scales.last_mut().unwrap()
+}
+
 #[test]
 fn an_option_out_of_range_is_named_with_its_value() {
     let spoiled: Vec<Spoiled> = vec![
-        (|o| o.scales.clear(), "scales", "[]"),
-        (|o| o.scales.last_mut().unwrap().foods = 1, "scales.foods", "1"),
-        (|o| o.scales.last_mut().unwrap().first_iterations = 1_000_000, "scales.first_iterations", "1000000"),
-        (|o| o.scales.last_mut().unwrap().cycles = 1_000_000, "scales.cycles", "1000000"),
-        (|o| o.scales.last_mut().unwrap().cycle_iterations = 1_000_000, "scales.cycle_iterations", "1000000"),
-        (|o| o.window_radius = 0, "window_radius", "0"),
-        (|o| o.window_radius = u32::MAX, "window_radius", "4294967295"),
-        (|o| o.finest_window_radius = 17, "finest_window_radius", "17"),
-        (|o| o.window_step = 0, "window_step", "0"),
-        (|o| o.min_consistent = 0, "min_consistent", "0"),
-        (|o| o.aggregation = Aggregation::BestViews(0), "best_views", "0"),
-        (|o| o.aggregation = Aggregation::BestViews(9), "best_views", "9"),
-        (|o| o.focused_views = 1, "focused_views", "1"),
-        (|o| o.stop_share = 1.5, "stop_share", "1.5"),
-        (|o| o.spatial_sigma = 0.0, "spatial_sigma", "0"),
-        (|o| o.colour_sigma = -1.0, "colour_sigma", "-1"),
-        (|o| o.min_variance = f64::NAN, "min_variance", "NaN"),
-        (|o| o.noise_ratio = -0.5, "noise_ratio", "-0.5"),
-        (|o| o.smoothing_passes = 1000, "smoothing_passes", "1000"),
-        (|o| o.triangulation_angle.0 = -1.0, "triangulation_angle.min", "-1"),
-        (|o| o.triangulation_angle = (20.0, 10.0), "triangulation_angle.max", "10"),
-        (|o| o.max_incident_angle = 91.0, "max_incident_angle", "91"),
-        (|o| o.occlusion_margin = -0.1, "occlusion_margin", "-0.1"),
-        (|o| o.smoothness = -0.1, "smoothness", "-0.1"),
-        (|o| o.smoothness_depth = 0.0, "smoothness_depth", "0"),
-        (|o| o.smoothness_normal = 200.0, "smoothness_normal", "200"),
-        (|o| o.reward = f64::INFINITY, "reward", "inf"),
-        (|o| o.geometric_weight = -1.0, "geometric_weight", "-1"),
-        (|o| o.geometric_limit = f64::NAN, "geometric_limit", "NaN"),
-        (|o| o.geometric_unknown = -2.0, "geometric_unknown", "-2"),
-        (|o| o.depth_tolerance = f64::NAN, "depth_tolerance", "NaN"),
-        (|o| o.normal_tolerance = 181.0, "normal_tolerance", "181"),
-        (|o| o.consistent_share = 70.0, "consistent_share", "70"),
+        (|o| o.schedule.scales.clear(), "schedule.scales: downscale", "[]"),
+        (|o| last_scale(o).food_sources = 1, "schedule.scales: food_sources", "1"),
+        (|o| last_scale(o).first_iterations = 1_000_000, "schedule.scales: first_iterations", "1000000"),
+        (|o| last_scale(o).cycles = 1_000_000, "schedule.scales: cycles", "1000000"),
+        (|o| last_scale(o).cycle_iterations = 1_000_000, "schedule.scales: cycle_iterations", "1000000"),
+        (|o| o.schedule.min_changed_fraction = 1.5, "schedule.min_changed_fraction", "1.5"),
+        (|o| o.threads = 5000, "threads", "5000"),
+        (|o| o.window.window_radius = 0, "window.window_radius", "0"),
+        (|o| o.window.window_radius = u32::MAX, "window.window_radius", "4294967295"),
+        (|o| o.window.full_size_window_radius = 17, "window.full_size_window_radius", "17"),
+        (|o| o.window.window_step = 0, "window.window_step", "0"),
+        (|o| o.window.sigma_spatial = 0.0, "window.sigma_spatial", "0"),
+        (|o| o.window.sigma_color = -1.0, "window.sigma_color", "-1"),
+        (|o| o.window.min_variance = f64::NAN, "window.min_variance", "NaN"),
+        (|o| o.window.min_texture_to_noise = -0.5, "window.min_texture_to_noise", "-0.5"),
+        (|o| o.cost.best_views = 9, "cost.best_views", "9"),
+        (|o| o.cost.max_views_per_pixel = 1, "cost.max_views_per_pixel", "1"),
+        (|o| o.cost.geom_consistency_weight = -1.0, "cost.geom_consistency_weight", "-1"),
+        (|o| o.cost.geom_consistency_max_error = f64::NAN, "cost.geom_consistency_max_error", "NaN"),
+        (|o| o.cost.geom_consistency_missing_error = -2.0, "cost.geom_consistency_missing_error", "-2"),
+        (|o| o.cost.smoothness_weight = -0.1, "cost.smoothness_weight", "-0.1"),
+        (|o| o.cost.smoothness_max_depth_error = 0.0, "cost.smoothness_max_depth_error", "0"),
+        (|o| o.cost.smoothness_max_normal_error = 200.0, "cost.smoothness_max_normal_error", "200"),
+        (|o| o.search.smoothness_reward = f64::INFINITY, "search.smoothness_reward", "inf"),
+        (|o| o.view_selection.min_triangulation_angle = -1.0, "view_selection.min_triangulation_angle", "-1"),
+        (|o| o.view_selection.max_triangulation_angle = 3.0, "view_selection.max_triangulation_angle", "3"),
+        (|o| o.view_selection.max_incident_angle = 91.0, "view_selection.max_incident_angle", "91"),
+        (|o| o.view_selection.occlusion_tolerance = -0.1, "view_selection.occlusion_tolerance", "-0.1"),
+        (|o| o.check.min_consistent_views = 0, "check.min_consistent_views", "0"),
+        (|o| o.check.depth_tolerance = f64::NAN, "check.depth_tolerance", "NaN"),
+        (|o| o.check.normal_tolerance = 181.0, "check.normal_tolerance", "181"),
+        (|o| o.check.min_consistent_fraction = 70.0, "check.min_consistent_fraction", "70"),
+        (|o| o.refine.smoothing_passes = 1000, "refine.smoothing_passes", "1000"),
         (|o| o.fusion.depth_tolerance = 2.0, "fusion.depth_tolerance", "2"),
         (|o| o.fusion.normal_tolerance = -3.0, "fusion.normal_tolerance", "-3"),
     ];
@@ -69,17 +73,21 @@ fn an_option_out_of_range_is_named_with_its_value() {
 }
 
 #[test]
-fn scales_must_descend_one_by_one_to_full_size() {
-    let with = |halvings: &[u32]| {
-        let scale = |&halvings| Scale { halvings, ..Options::paper().scales[0] };
-        Options { scales: halvings.iter().map(scale).collect(), ..Options::default() }.check()
+fn scales_must_double_from_one_to_the_next_up_to_full_size() {
+    let check = |downscales: &[u32]| {
+        let mut options = Options::paper();
+        let scale = options.schedule.scales[0];
+        options.schedule.scales = downscales.iter().map(|&downscale| Scale { downscale, ..scale }).collect();
+        options.check()
     };
-    for halvings in [&[0][..], &[1, 0], &[2, 1, 0]] {
-        assert_eq!(with(halvings), Ok(()));
+    for downscales in [&[1][..], &[2, 1], &[4, 2, 1]] {
+        assert_eq!(check(downscales), Ok(()));
     }
-    for halvings in [&[1][..], &[0, 1], &[2, 0], &[0, 0], &[9, 8, 7, 6, 5, 4, 3, 2, 1, 0], &[u32::MAX, 0]] {
-        let error = with(halvings).unwrap_err().to_string();
-        assert!(error.starts_with("options.scales"), "{error}");
+    for downscales in
+        [&[2][..], &[1, 2], &[4, 1], &[1, 1], &[3, 1], &[512, 256, 128, 64, 32, 16, 8, 4, 2, 1], &[0, 0, 1]]
+    {
+        let error = check(downscales).unwrap_err().to_string();
+        assert!(error.starts_with("options.schedule.scales"), "{error}");
     }
 }
 
@@ -87,19 +95,18 @@ fn scales_must_descend_one_by_one_to_full_size() {
 fn every_option_is_listed_and_shows_its_change() {
     let changes: [fn(&mut Options); 6] = [
         |o| o.seed = 77,
-        |o| o.simd = Some(Level::Scalar),
-        |o| o.aggregation = Aggregation::BestViews(7),
-        |o| o.scales[0].foods = 33,
-        |o| o.occluders_abstain = !o.occluders_abstain,
-        |o| o.fusion = FusionOptions { min_views: 17, ..o.fusion },
+        |o| o.simd = Some(SimdLevel::Scalar),
+        |o| o.cost.best_views = 7,
+        |o| o.schedule.scales[0].food_sources = 33,
+        |o| o.check.ignore_occluders = !o.check.ignore_occluders,
+        |o| o.fusion.min_views = 17,
     ];
-    let before = Options::default().entries();
+    let before: Vec<_> = Options::default().values().collect();
     for change in changes {
         let mut options = Options::default();
         change(&mut options);
-        let after = options.entries();
-        let changed = before.iter().zip(&after).filter(|(before, after)| before != after).count();
-        assert_eq!(changed, 1, "{after:?}");
+        let changed = options.values().zip(&before).filter(|(after, before)| after != *before).count();
+        assert_eq!(changed, 1, "{options:?}");
     }
     let mut names: Vec<&str> = before.iter().map(|entry| entry.0).collect();
     names.sort_unstable();

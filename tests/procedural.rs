@@ -2,10 +2,10 @@
 
 mod common;
 
-use common::procedural::{self, MIDDLE, Procedural, Texture, pixel_centre};
+use common::procedural::{self, MIDDLE, Procedural, Texture, pixel_center};
 use glam::DVec3;
 use skep::View;
-use skep::camera::Plane;
+use skep::geometry::Plane;
 
 fn scenes() -> Vec<Procedural> {
     vec![procedural::plane_and_sphere(), procedural::occluding_post(), procedural::textureless_panel()]
@@ -29,16 +29,16 @@ fn truth_agrees_between_views_where_the_ray_test_says_visible() {
         for pixel in (0..made.truth[0].depth.len()).step_by(5) {
             let camera = &made.views[0].camera;
             let depth = f64::from(made.truth[0].depth[pixel]);
-            let position = camera.unproject(pixel_centre(camera, pixel), depth);
+            let position = camera.unproject(pixel_center(camera, pixel), depth);
             for (view, other) in made.views.iter().enumerate().skip(1) {
                 let Some((projection, depth)) = other.camera.project(position) else { continue };
                 let Some((column, row)) = other.camera.nearest_pixel(projection) else { continue };
                 let nearest = (row * other.camera.width + column) as usize;
-                // From the pixel's centre to the projection along its tangent plane.
+                // From the pixel's center to the projection along its tangent plane.
                 let normal = DVec3::from_array(made.truth[view].normal[nearest].map(f64::from));
-                let centre = pixel_centre(&other.camera, nearest);
+                let center = pixel_center(&other.camera, nearest);
                 let there = f64::from(made.truth[view].depth[nearest]);
-                let there = Plane::at(&other.camera, centre, there, normal).depth(&other.camera, projection);
+                let there = Plane::at(&other.camera, center, there, normal).depth(&other.camera, projection);
                 // At the rim of the sphere a tangent plane says little, at an edge the nearest pixel.
                 if normal.z > -0.35 || is_on_edge(&made, view, nearest) {
                     continue;
@@ -66,7 +66,7 @@ fn depth_fills_every_image_and_normals_are_unit_and_face_the_camera() {
                 let normal = DVec3::from_array(normal.map(f64::from));
                 assert!(depth > 1.0 && depth < 10.0);
                 assert!((normal.length() - 1.0).abs() < 1e-6);
-                assert!(normal.dot(view.camera.ray(pixel_centre(&view.camera, pixel))) < 0.0);
+                assert!(normal.dot(view.camera.ray(pixel_center(&view.camera, pixel))) < 0.0);
             }
         }
     }
@@ -77,13 +77,13 @@ fn pictures_of_a_surface_point_look_alike_and_have_texture() {
     let made = procedural::plane_and_sphere();
     let (mut difference, mut contrast, mut count) = (0.0, 0.0, 0.0);
     for point in &made.points {
-        let grey = |view: u32| {
+        let gray = |view: u32| {
             let View { camera, picture, .. } = &made.views[view as usize];
             let (column, row) = camera.nearest_pixel(camera.project(point.position).unwrap().0).unwrap();
-            f64::from(picture.grey()[(row * camera.width + column) as usize])
+            f64::from(picture.gray()[(row * camera.width + column) as usize])
         };
-        difference += (grey(point.views[0]) - grey(point.views[1])).abs();
-        contrast += (grey(point.views[0]) - 127.5).abs();
+        difference += (gray(point.views[0]) - gray(point.views[1])).abs();
+        contrast += (gray(point.views[0]) - 127.5).abs();
         count += 1.0;
     }
     assert!(contrast / count > 15.0, "mean contrast {}", contrast / count);
@@ -95,7 +95,7 @@ fn many_pairs_of_views_see_the_scene_under_a_good_angle() {
     let made = procedural::plane_and_sphere();
     for (index, view) in made.views.iter().enumerate() {
         let good = made.views.iter().filter(|other| {
-            let angle = view.camera.centre().angle_between(other.camera.centre()).to_degrees();
+            let angle = view.camera.center().angle_between(other.camera.center()).to_degrees();
             (10.0..=30.0).contains(&angle)
         });
         assert!(good.count() >= 4, "view {index}");
@@ -105,13 +105,13 @@ fn many_pairs_of_views_see_the_scene_under_a_good_angle() {
 }
 
 #[test]
-fn the_panel_has_one_grey_value_and_no_sparse_points() {
+fn the_panel_has_one_gray_value_and_no_sparse_points() {
     let made = procedural::textureless_panel();
     let mut panel = 0;
-    for (pixel, &grey) in made.views[MIDDLE].picture.grey().iter().enumerate() {
+    for (pixel, &gray) in made.views[MIDDLE].picture.gray().iter().enumerate() {
         if made.hit(MIDDLE, pixel).unwrap().surface == procedural::PANEL && !is_on_edge(&made, MIDDLE, pixel)
         {
-            assert_eq!(grey, 128);
+            assert_eq!(gray, 128);
             panel += 1;
         }
     }

@@ -1,13 +1,13 @@
 //! Every back-end's operations against the scalar ones: the same bits.
 
 use proptest::prelude::*;
-use skep::simd::{LANES, Level, Scalar, Simd, Taps, Task, WEIGHTS, dispatch};
+use skep::simd::{LANES, SAMPLE_SCALE, Scalar, Simd, SimdLevel, Taps, Task, dispatch};
 
 type Lanes = [f32; LANES];
 
 /// The back-ends of this machine.
-fn levels() -> impl Iterator<Item = Level> {
-    Level::ALL.into_iter().filter(|level| level.is_available())
+fn levels() -> impl Iterator<Item = SimdLevel> {
+    SimdLevel::ALL.into_iter().filter(|level| level.is_available())
 }
 
 /// An operation written once for all back-ends.
@@ -18,7 +18,7 @@ trait Operation: Copy {
 struct Vectorized<O>(O);
 
 impl<O: Operation> Task for Vectorized<O> {
-    type Output = (Level, Vec<Lanes>);
+    type Output = (SimdLevel, Vec<Lanes>);
 
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         (S::LEVEL, simd.vectorize(|| self.0.run(simd)))
@@ -64,10 +64,10 @@ impl Operation for Arithmetic {
             simd.max(a, b),
             simd.min(a, b),
             simd.mul_add(a, b, c),
-            simd.splat(simd.sum(a)),
+            simd.splat(simd.reduce_sum(a)),
             simd.sqrt(a),
-            simd.splat(f32::from(simd.at_least(a, b))),
-            simd.sums(&[a, b, c, a, b, c, a, b]),
+            simd.splat(f32::from(simd.simd_ge(a, b))),
+            simd.reduce_sum_8x8(&[a, b, c, a, b, c, a, b]),
             simd.select(0b1010_0110, a, b),
         ];
         results.map(|lanes| simd.store(lanes)).to_vec()
@@ -79,7 +79,7 @@ struct Whole(Lanes);
 
 impl Operation for Whole {
     fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
-        vec![simd.store(simd.whole(simd.load(&self.0)))]
+        vec![simd.store(simd.trunc(simd.load(&self.0)))]
     }
 }
 
@@ -88,7 +88,7 @@ struct Largest(Lanes);
 
 impl Operation for Largest {
     fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
-        vec![[simd.largest(simd.load(&self.0)); LANES]]
+        vec![[simd.reduce_max(simd.load(&self.0)); LANES]]
     }
 }
 
@@ -97,7 +97,7 @@ struct Places<'a>(&'a [i32; LANES], Lanes, Lanes);
 
 impl Operation for Places<'_> {
     fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
-        let places = simd.places(self.0, simd.load(&self.1), simd.load(&self.2));
+        let places = simd.linear_indices(self.0, simd.load(&self.1), simd.load(&self.2));
         // Their bits: f32 does not hold every u32.
         vec![places.map(f32::from_bits)]
     }
@@ -108,7 +108,11 @@ struct Bilinear<'a>(&'a Taps, Lanes, Lanes);
 
 impl Operation for Bilinear<'_> {
     fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
-        vec![simd.store(simd.read(simd.aim(self.0, simd.load(&self.1), simd.load(&self.2))))]
+        vec![simd.store(simd.sample_bilinear(simd.sample_positions(
+            self.0,
+            simd.load(&self.1),
+            simd.load(&self.2),
+        )))]
     }
 }
 
@@ -137,11 +141,11 @@ fn whole_lanes(below: u32) -> impl Strategy<Value = Lanes> {
 
 prop_compose! {
     fn image()(width in 1..20usize, height in 1..20usize)(
-        grey in prop::collection::vec(any::<u8>(), width * height),
+        gray in prop::collection::vec(any::<u8>(), width * height),
         width in Just(width),
         height in Just(height),
     ) -> (Vec<u8>, usize, usize) {
-        (grey, width, height)
+        (gray, width, height)
     }
 }
 
@@ -152,7 +156,7 @@ fn eight_sums_stand_in_the_order_of_their_vectors() {
     impl Operation for Sums {
         fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
             let vectors = std::array::from_fn(|vector| simd.splat(vector as f32));
-            vec![simd.store(simd.sums(&vectors))]
+            vec![simd.store(simd.reduce_sum_8x8(&vectors))]
         }
     }
     check(Sums).unwrap();
@@ -187,16 +191,16 @@ proptest! {
         check(Places(&strides, x, y))?;
         let expected: [u32; LANES] =
             std::array::from_fn(|lane| y[lane] as u32 * strides[lane] as u32 + x[lane] as u32);
-        prop_assert_eq!(Scalar.places(&strides, x, y), expected);
+        prop_assert_eq!(Scalar.linear_indices(&strides, x, y), expected);
     }
 
     #[test]
     fn samples_between_pixels_are_the_weighted_mean_of_four(
-        (grey, width, height) in image(),
+        (gray, width, height) in image(),
         x in prop::array::uniform8(prop_oneof![-600.0..5_000.0f32, any_lane()]),
         y in prop::array::uniform8(prop_oneof![-600.0..5_000.0f32, any_lane()]),
     ) {
-        let taps = Taps::new(&grey, width, height);
+        let taps = Taps::new(&gray, width, height);
         check(Bilinear(&taps, x, y))?;
         let samples = Bilinear(&taps, x, y).run(Scalar)[0];
         for lane in 0..LANES {
@@ -207,22 +211,22 @@ proptest! {
             };
             let ((column, along), (row, down)) = (split(x[lane], width), split(y[lane], height));
             let at = |column: usize, row: usize| {
-                f64::from(grey[row.min(height - 1) * width + column.min(width - 1)])
+                f64::from(gray[row.min(height - 1) * width + column.min(width - 1)])
             };
             let top = at(column, row) * (1.0 - along) + at(column + 1, row) * along;
             let low = at(column, row + 1) * (1.0 - along) + at(column + 1, row + 1) * along;
             let expected = top * (1.0 - down) + low * down;
-            let sample = f64::from(samples[lane] / WEIGHTS) + 128.0;
+            let sample = f64::from(samples[lane] / SAMPLE_SCALE) + 128.0;
             prop_assert!((sample - expected).abs() < 1e-4, "{} instead of {}", sample, expected);
         }
     }
 
     #[test]
     fn gathered_taps_are_those_of_two_pairs_also_beyond_the_end(
-        (grey, width, height) in image(),
+        (gray, width, height) in image(),
         at in prop::array::uniform8(prop_oneof![0..400u32, any::<u32>()]),
     ) {
-        let taps = Taps::new(&grey, width, height);
+        let taps = Taps::new(&gray, width, height);
         check(Gather(&taps, &at))?;
         for (gathered, index) in Scalar.gather(&taps, &at).into_iter().zip(at) {
             let index = (index as usize).min(taps.pairs().len() - 2);
@@ -257,13 +261,13 @@ fn lanes_are_added_in_the_documented_tree() {
     let tree = ((l[0] + l[4]) + (l[2] + l[6])) + ((l[1] + l[5]) + (l[3] + l[7]));
     let in_order = l.iter().fold(0.0f32, |sum, lane| sum + lane);
     assert_ne!(tree, in_order, "the lanes must tell the orders apart");
-    assert_eq!(Scalar.sum(l), tree);
+    assert_eq!(Scalar.reduce_sum(l), tree);
 }
 
 #[test]
 fn there_are_levels_and_the_last_is_the_best_of_the_machine() {
-    assert!(levels().take(2).eq([Level::Scalar, Level::Base]));
-    assert!(Level::detect().is_available());
+    assert!(levels().take(2).eq([SimdLevel::Scalar, SimdLevel::Baseline]));
+    assert!(SimdLevel::detect().is_available());
     // A machine whose AVX2 goes unused must not pass for tested.
     #[cfg(target_arch = "x86_64")]
     {
@@ -271,16 +275,16 @@ fn there_are_levels_and_the_last_is_the_best_of_the_machine() {
             && std::is_x86_feature_detected!("bmi1")
             && std::is_x86_feature_detected!("bmi2")
             && std::is_x86_feature_detected!("popcnt");
-        assert_eq!(Level::X86V3.is_available(), has_v3);
+        assert_eq!(SimdLevel::X86V3.is_available(), has_v3);
         if std::env::var_os("SKEP_SIMD").is_none() {
-            let best = if has_v3 { Level::X86V3 } else { Level::Base };
-            assert_eq!(Level::detect(), best);
+            let best = if has_v3 { SimdLevel::X86V3 } else { SimdLevel::Baseline };
+            assert_eq!(SimdLevel::detect(), best);
         }
     }
 }
 
 #[test]
 fn a_level_the_machine_lacks_is_lowered() {
-    let (ran, _) = dispatch(Level::X86V3, Vectorized(Whole([0.0; LANES])));
+    let (ran, _) = dispatch(SimdLevel::X86V3, Vectorized(Whole([0.0; LANES])));
     assert_eq!(ran, levels().last().unwrap());
 }

@@ -9,14 +9,14 @@
 #include <cstdio>
 
 /// Near is red, far is blue, black is unknown.
-static cv::Mat coloured(const cv::Mat &depth) {
-    cv::Mat inverse, grey, colours;
+static cv::Mat colored(const cv::Mat &depth) {
+    cv::Mat inverse, gray, colors;
     const cv::Mat known = depth > 0;
     cv::divide(1.0, depth, inverse);
-    cv::normalize(inverse, grey, 0, 255, cv::NORM_MINMAX, CV_8U, known);
-    cv::applyColorMap(grey, colours, cv::COLORMAP_TURBO);
-    colours.setTo(0, ~known);
-    return colours;
+    cv::normalize(inverse, gray, 0, 255, cv::NORM_MINMAX, CV_8U, known);
+    cv::applyColorMap(gray, colors, cv::COLORMAP_TURBO);
+    colors.setTo(0, ~known);
+    return colors;
 }
 
 int main(int argc, char **argv) try {
@@ -48,7 +48,7 @@ int main(int argc, char **argv) try {
     cloud.write_ply(argv[2]);
     cv::Mat depth;
     result.depth(0, skep::Maps::Validated, depth);
-    cv::imwrite(argv[3], coloured(depth));
+    cv::imwrite(argv[3], colored(depth));
     std::printf("\n%zu points in %s, depths of %s in %s\n", cloud.size(), argv[2],
                 model.name(0).c_str(), argv[3]);
 } catch (const skep::Error &error) {

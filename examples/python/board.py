@@ -50,17 +50,17 @@ panels = {
     "depth, validated": (depth, "turbo"),
     "normals, raw": ((view.normal * [1, -1, -1] + 1) / 2, None),
     "source views of each pixel": (view.source_count, "viridis"),
-    "why pixels are empty": (view.outcome, matplotlib.colormaps["Set2"].resampled(len(skep.Outcome))),
+    "why pixels are empty": (view.status, matplotlib.colormaps["Set2"].resampled(len(skep.PixelStatus))),
 }
 figure, axes = pyplot.subplots(2, 2, figsize=(12, 8), layout="constrained")
-for axis, (title, (values, colours)) in zip(axes.flat, panels.items()):
-    low, high = (-0.5, len(skep.Outcome) - 0.5) if "why" in title else (None, None)
-    shown = axis.imshow(values, cmap=colours, vmin=low, vmax=high)
+for axis, (title, (values, colors)) in zip(axes.flat, panels.items()):
+    low, high = (-0.5, len(skep.PixelStatus) - 0.5) if "why" in title else (None, None)
+    shown = axis.imshow(values, cmap=colors, vmin=low, vmax=high)
     axis.set(title=title, xticks=[], yticks=[])
     if "why" in title:
-        names = [outcome.name.lower().replace("_", " ") for outcome in skep.Outcome]
-        figure.colorbar(shown, ax=axis, shrink=0.7).set_ticks(list(skep.Outcome), labels=names)
-    elif colours:
+        names = [status.name.lower().replace("_", " ") for status in skep.PixelStatus]
+        figure.colorbar(shown, ax=axis, shrink=0.7).set_ticks(list(skep.PixelStatus), labels=names)
+    elif colors:
         figure.colorbar(shown, ax=axis, shrink=0.7)
 figure.savefig(pictures / "maps.png", dpi=80)
 
@@ -71,7 +71,7 @@ sine, cosine = np.sin(np.radians(50)), np.cos(np.radians(50))
 across, away = cosine * x + sine * z, cosine * z - sine * x
 order = np.argsort(-away)
 figure, axis = pyplot.subplots(figsize=(8, 6), layout="constrained")
-axis.scatter(across[order], y[order], c=cloud.colours[order] / 255, s=0.5, linewidths=0)
+axis.scatter(across[order], y[order], c=cloud.colors[order] / 255, s=0.5, linewidths=0)
 (left, right), (top, bottom) = np.percentile(across, [1, 99]), np.percentile(y, [1, 99])
 axis.set(title=f"{len(cloud)} points", aspect="equal", xlim=(left, right), ylim=(bottom, top))
 figure.savefig(pictures / "cloud.png", dpi=80)

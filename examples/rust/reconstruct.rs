@@ -1,21 +1,21 @@
 //! A scene folder in, maps and a cloud out: `cargo run --release --example reconstruct -- SCENE DENSE`.
 
 use skep::io::{SceneFolder, Workspace, read_scene};
-use skep::{Options, Outcome, Progress};
+use skep::{Options, PixelStatus, Progress};
 use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::Path;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let outcome = match &arguments[..] {
+    let status = match &arguments[..] {
         [scene, dense] => reconstruct(Path::new(scene), Path::new(dense)),
         _ => {
             eprintln!("usage: reconstruct SCENE DENSE (SCENE holds images/ and sparse/)");
             std::process::exit(2);
         }
     };
-    if let Err(error) = outcome {
+    if let Err(error) = status {
         eprintln!("reconstruct: {error}");
         std::process::exit(1);
     }
@@ -25,7 +25,8 @@ fn reconstruct(folder: &Path, dense: &Path) -> skep::Result<()> {
     let scene = read_scene(folder, None)?;
     // Options are fields, and have names too.
     let mut options = Options { seed: 1, ..Options::default() };
-    options.set("fusion.min_views", 2.0)?;
+    options.fusion.min_views = 2;
+    options.set("check.depth_tolerance", "0.01")?;
 
     let result = skep::reconstruct(&scene, &options, &show)?;
     eprintln!();
@@ -36,11 +37,11 @@ fn reconstruct(folder: &Path, dense: &Path) -> skep::Result<()> {
     let workspace = Workspace::new(dense);
     for (view, found) in scene.views().iter().zip(&result.views) {
         workspace.write_view(&view.name, &view.camera, found)?;
-        let counts = found.outcome_counts();
-        let validated = 100.0 * counts[Outcome::Validated as usize] as f64 / found.outcome.len() as f64;
+        let counts = found.status_counts();
+        let validated = 100.0 * counts[PixelStatus::Validated as usize] as f64 / found.status.len() as f64;
         println!("{}: {validated:.1} % validated, from {} source views", view.name, found.sources.len());
-        for outcome in Outcome::ALL.into_iter().skip(1).filter(|&outcome| counts[outcome as usize] > 0) {
-            println!("  {:>9} pixels {}", counts[outcome as usize], outcome.name());
+        for status in PixelStatus::ALL.into_iter().skip(1).filter(|&status| counts[status as usize] > 0) {
+            println!("  {:>9} pixels {}", counts[status as usize], status.name());
         }
     }
     workspace.write_lists(scene.views().iter().map(|view| view.name.as_str()))?;

@@ -59,8 +59,8 @@ int main(void) {
     const skep_camera *from = &made.photographs[0].camera, *to = &made.photographs[1].camera;
 
     long before = atomic_load(&allocations);
-    skep_window *window = make_window();
-    skep_samples *reference = make_samples(&made, 0), *source = make_samples(&made, 1);
+    skep_ncc_window *window = make_window();
+    skep_packed_image *reference = make_samples(&made, 0), *source = make_samples(&made, 1);
     const long made_with = atomic_load(&allocations) - before;
     CHECK(made_with >= 3, "allocations of the library are counted, but there were %ld", made_with);
 
@@ -75,9 +75,9 @@ int main(void) {
            worked_with);
     CHECK(count == MOST && worked_with == 0, "%ld allocations", worked_with);
 
-    skep_samples_destroy(source);
-    skep_samples_destroy(reference);
-    skep_window_destroy(window);
+    skep_packed_image_destroy(source);
+    skep_packed_image_destroy(reference);
+    skep_ncc_window_destroy(window);
     scene_free(&made);
     return check_summary();
 }

@@ -85,31 +85,31 @@ static void check_runs(const scene *made, const skep_scene *handed_in,
     skep_result_destroy(expected);
 }
 
-static void check_steps(const scene *made, const skep_scene *handed_in,
+static void check_stepper(const scene *made, const skep_scene *handed_in,
                         const skep_options *options) {
-    skep_steps *steps = NULL;
-    REQUIRE(skep_steps_create(handed_in, options, &steps));
+    skep_stepper *stepper = NULL;
+    REQUIRE(skep_stepper_create(handed_in, options, &stepper));
     host self = {.stop_at = 0};
     skep_status status =
-        skep_steps_search(steps, 2, 0, NULL, 0, NULL, callback, &self, OUT(skep_state *, 0));
-    check_stopped(&self, status, "skep_steps_search");
+        skep_stepper_search(stepper, 2, 0, NULL, 0, NULL, callback, &self, OUT(skep_estimate *, 0));
+    check_stopped(&self, status, "skep_stepper_search");
     self = (host){.stop_at = 2};
-    skep_state *states[MAX_VIEWS] = {NULL}, *searched = NULL;
-    REQUIRE(skep_steps_search(steps, 2, 0, NULL, 0, NULL, callback, &self, &searched));
-    states[0] = searched;
+    skep_estimate *estimates[MAX_VIEWS] = {NULL}, *searched = NULL;
+    REQUIRE(skep_stepper_search(stepper, 2, 0, NULL, 0, NULL, callback, &self, &searched));
+    estimates[0] = searched;
     REQUIRE(
-        skep_steps_check(steps, 2, 0, (const skep_state *const *)states, made->views, &states[0]));
-    skep_state_destroy(searched);
+        skep_stepper_check(stepper, 2, 0, (const skep_estimate *const *)estimates, made->views, &estimates[0]));
+    skep_estimate_destroy(searched);
     self = (host){.stop_at = 0};
-    status = skep_steps_finish(steps, 0, (const skep_state *const *)states, made->views, callback,
+    status = skep_stepper_finish(stepper, 0, (const skep_estimate *const *)estimates, made->views, callback,
                                &self, OUT(skep_result *, 0));
-    check_stopped(&self, status, "skep_steps_finish");
+    check_stopped(&self, status, "skep_stepper_finish");
     skep_result *result = NULL;
-    REQUIRE(skep_steps_finish(steps, 0, (const skep_state *const *)states, made->views, NULL, NULL,
+    REQUIRE(skep_stepper_finish(stepper, 0, (const skep_estimate *const *)estimates, made->views, NULL, NULL,
                               &result));
     skep_result_destroy(result);
-    skep_state_destroy(states[0]);
-    skep_steps_destroy(steps);
+    skep_estimate_destroy(estimates[0]);
+    skep_stepper_destroy(stepper);
 }
 
 static void check_fusion(const scene *made) {
@@ -153,7 +153,7 @@ void test_cancel(const char *folder) {
     skep_scene *handed_in = scene_hand_in(&made);
     REQUIRE(skep_options_set(options, "threads", 4));
     check_runs(&made, handed_in, options);
-    check_steps(&made, handed_in, options);
+    check_stepper(&made, handed_in, options);
     check_fusion(&made);
     skep_scene_destroy(handed_in);
     skep_options_destroy(options);

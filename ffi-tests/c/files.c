@@ -150,7 +150,7 @@ static void check_ply(const char *folder, const skep_result *result) {
                 CHECK(numbers[axis] == (float)all.positions[3 * i + axis], "point %zu", i);
             }
             CHECK(same_bytes(numbers + 3, all.normals + 3 * i, 12), "point %zu", i);
-            CHECK(same_bytes(bytes + header + 27 * i + 24, all.colours + 3 * i, 3), "point %zu", i);
+            CHECK(same_bytes(bytes + header + 27 * i + 24, all.colors + 3 * i, 3), "point %zu", i);
         }
     }
     CHECK(file_size(beside) == 8 + 4 * (all.count + all.view_total), "%zu bytes",

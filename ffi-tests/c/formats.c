@@ -12,12 +12,12 @@
 #include <stdio.h>
 #include <string.h>
 
-static const uint32_t LAYOUTS[] = {SKEP_FORMAT_GREY, SKEP_FORMAT_RGB, SKEP_FORMAT_BGR,
+static const uint32_t LAYOUTS[] = {SKEP_FORMAT_GRAY, SKEP_FORMAT_RGB, SKEP_FORMAT_BGR,
                                    SKEP_FORMAT_RGBA, SKEP_FORMAT_BGRA};
 static const uint32_t DEPTHS[] = {0, SKEP_FORMAT_16, SKEP_FORMAT_FLOAT};
 
 static size_t channels_of(uint32_t layout) {
-    return layout == SKEP_FORMAT_GREY ? 1 : layout <= SKEP_FORMAT_BGR ? 3 : 4;
+    return layout == SKEP_FORMAT_GRAY ? 1 : layout <= SKEP_FORMAT_BGR ? 3 : 4;
 }
 
 static size_t channel_bytes(uint32_t depth) {
@@ -25,7 +25,7 @@ static size_t channel_bytes(uint32_t depth) {
 }
 
 /* The luma of ITU-R BT.601, rounded. */
-static uint8_t grey_of(const uint8_t *rgb) {
+static uint8_t gray_of(const uint8_t *rgb) {
     return (uint8_t)((299u * rgb[0] + 587u * rgb[1] + 114u * rgb[2] + 500u) / 1000u);
 }
 
@@ -62,7 +62,7 @@ static skep_image converted(const scene *made, uint32_t view, uint32_t layout, u
             const int from = ORDERS[layout][channel];
             const uint8_t value = from == 3 ? (uint8_t)(7 * pixel)
                                   : layout  ? rgb[from]
-                                            : grey_of(rgb);
+                                            : gray_of(rgb);
             put(place + channel * bytes, depth, value, off * sign);
         }
     }
@@ -99,7 +99,7 @@ static void check_ends(void) {
     const uint8_t expected[] = {0, 0, 0, 0, 0, 255, 255, 255, 255, 0};
     const uint16_t shorts[] = {0, 128, 129, 385, 386, 65535, 65407, 65406};
     const uint8_t rounded[] = {0, 0, 1, 1, 2, 255, 255, 254};
-    /* A fused cloud tells the colours that were stored. */
+    /* A fused cloud tells the colors that were stored. */
     const skep_camera camera = {1, 1, 0, 0, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
     skep_options *options = NULL;
     REQUIRE(skep_options_create(NULL, &options));
@@ -109,16 +109,16 @@ static void check_ends(void) {
         const size_t j = is_float ? i : i - sizeof expected;
         const skep_image image = {
             is_float ? (const void *)&floats[j] : (const void *)&shorts[j], 1, 1, 4,
-            SKEP_FORMAT_GREY + (is_float ? SKEP_FORMAT_FLOAT : SKEP_FORMAT_16)};
+            SKEP_FORMAT_GRAY + (is_float ? SKEP_FORMAT_FLOAT : SKEP_FORMAT_16)};
         const float depth = 2, normal[3] = {0, 0, -1};
         const skep_fusion_view view = {&camera, 1, 1, &depth, 4, normal, 12, &image, NULL, 0};
         skep_cloud *cloud = NULL;
         REQUIRE(skep_fuse(&view, 1, options, NULL, NULL, &cloud));
-        uint8_t colour[3] = {9, 9, 9};
-        REQUIRE(skep_cloud_get_points(cloud, NULL, NULL, colour, 1));
+        uint8_t color[3] = {9, 9, 9};
+        REQUIRE(skep_cloud_get_points(cloud, NULL, NULL, color, 1));
         const uint8_t wanted = is_float ? expected[j] : rounded[j];
-        CHECK(colour[0] == wanted && colour[1] == wanted && colour[2] == wanted,
-              "value %zu is %u, not %u", i, colour[0], wanted);
+        CHECK(color[0] == wanted && color[1] == wanted && color[2] == wanted,
+              "value %zu is %u, not %u", i, color[0], wanted);
         skep_cloud_destroy(cloud);
     }
     skep_options_destroy(options);

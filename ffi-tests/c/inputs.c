@@ -1,5 +1,5 @@
 /*
- * Masks, depth ranges, source views, sparse points and options are honoured, and can be asked for.
+ * Masks, depth ranges, source views, sparse points and options are honored, and can be asked for.
  * /
  */
 #include "support/check.h"
@@ -66,12 +66,12 @@ static void check_mask(const scene *made, skep_scene *handed_in, const skep_opti
     view_maps maps = maps_of(masked, 1);
     for (size_t i = 0; i < scene_pixels(made); ++i) {
         const int is_masked = i % made->width < made->width / 3;
-        CHECK((maps.outcome[i] == SKEP_PIXEL_MASKED) == is_masked, "pixel %zu", i);
+        CHECK((maps.status[i] == SKEP_PIXEL_MASKED) == is_masked, "pixel %zu", i);
         CHECK(!is_masked || (maps.depth[0][i] == 0 && maps.source_count[i] == 0), "pixel %zu", i);
     }
     maps_free(&maps);
     maps = maps_of(masked, 0);
-    CHECK(maps.statistics.pixels[SKEP_PIXEL_MASKED] == 0, "another view has no mask");
+    CHECK(maps.statistics.status_counts[SKEP_PIXEL_MASKED] == 0, "another view has no mask");
     maps_free(&maps);
     skep_result_destroy(masked);
     REQUIRE(skep_scene_set_mask(handed_in, 1, NULL, 0));
@@ -90,7 +90,7 @@ static void check_all_masked(const scene *made, const skep_options *options) {
     }
     skep_result *result = scene_run(handed_in, options);
     view_maps maps = maps_of(result, 0);
-    CHECK(maps.statistics.pixels[SKEP_PIXEL_MASKED] == scene_pixels(made), "all pixels");
+    CHECK(maps.statistics.status_counts[SKEP_PIXEL_MASKED] == scene_pixels(made), "all pixels");
     points cloud = points_of_result(result);
     CHECK(cloud.count == 0 && cloud.view_total == 0, "%zu points", cloud.count);
     points_free(&cloud);
@@ -111,8 +111,8 @@ static void check_range(const scene *made, skep_scene *handed_in, const skep_opt
     for (size_t i = 0; i < scene_pixels(made); ++i) {
         CHECK(maps.depth[0][i] >= 2 && maps.depth[0][i] <= 2.5f, "%g", maps.depth[0][i]);
     }
-    CHECK(maps.statistics.pixels[SKEP_PIXEL_VALIDATED] * 10 < scene_pixels(made), "%llu validated",
-          (unsigned long long)maps.statistics.pixels[SKEP_PIXEL_VALIDATED]);
+    CHECK(maps.statistics.status_counts[SKEP_PIXEL_VALIDATED] * 10 < scene_pixels(made), "%llu validated",
+          (unsigned long long)maps.statistics.status_counts[SKEP_PIXEL_VALIDATED]);
     maps_free(&maps);
     skep_result_destroy(result);
     REQUIRE(skep_scene_set_depth_range(handed_in, 0, 0, 0));
@@ -201,7 +201,7 @@ static void check_extremes(const skep_options *options) {
     skep_camera right = left;
     for (uint32_t width = 1; width <= 3; ++width) {
         const uint8_t pixels[3] = {10, 200, 30};
-        const skep_image image = {pixels, width, 1, 3, SKEP_FORMAT_GREY};
+        const skep_image image = {pixels, width, 1, 3, SKEP_FORMAT_GRAY};
         right.translation[0] = width == 3 ? 1e9 : -0.1;
         skep_scene *tiny = NULL;
         REQUIRE(skep_scene_create(&tiny));
@@ -214,8 +214,8 @@ static void check_extremes(const skep_options *options) {
         REQUIRE(skep_scene_validate(tiny));
         skep_result *result = scene_run(tiny, options);
         view_maps maps = maps_of(result, 0);
-        CHECK(maps.statistics.pixels[SKEP_PIXEL_VALIDATED] == 0, "%u pixels", (unsigned)width);
-        CHECK(maps.outcome[0] == SKEP_PIXEL_NO_SOURCES, "%u", maps.outcome[0]);
+        CHECK(maps.statistics.status_counts[SKEP_PIXEL_VALIDATED] == 0, "%u pixels", (unsigned)width);
+        CHECK(maps.status[0] == SKEP_PIXEL_NO_SOURCES, "%u", maps.status[0]);
         maps_free(&maps);
         char warning[256] = "";
         size_t needed = 0;

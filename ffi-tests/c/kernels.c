@@ -16,9 +16,9 @@ enum { MOST = 400 };
 
 typedef struct batch {
     const scene *made;
-    skep_window *window;
-    skep_samples *reference;
-    skep_samples *source;
+    skep_ncc_window *window;
+    skep_packed_image *reference;
+    skep_packed_image *source;
     skep_plane planes[MOST];
     uint32_t pixels[2 * MOST];
     double homographies[9 * MOST];
@@ -83,19 +83,19 @@ static void check_correlations(const batch *work) {
 /* A patch fits itself, its negative is its opposite, and what has no texture fits nothing. */
 static void check_known_values(void) {
     enum { SIDE = 21 };
-    static uint8_t grey[3][SIDE * SIDE];
-    skep_samples *samples[3];
+    static uint8_t gray[3][SIDE * SIDE];
+    skep_packed_image *samples[3];
     for (int i = 0; i < SIDE * SIDE; ++i) {
-        grey[0][i] = (uint8_t)(i * i % 199 + 20);
-        grey[1][i] = (uint8_t)(255 - grey[0][i]);
-        grey[2][i] = 77;
+        gray[0][i] = (uint8_t)(i * i % 199 + 20);
+        gray[1][i] = (uint8_t)(255 - gray[0][i]);
+        gray[2][i] = 77;
     }
     for (int i = 0; i < 3; ++i) {
-        const skep_image image = {grey[i], SIDE, SIDE, SIDE, SKEP_FORMAT_GREY};
-        REQUIRE(skep_samples_create(&image, &samples[i]));
+        const skep_image image = {gray[i], SIDE, SIDE, SIDE, SKEP_FORMAT_GRAY};
+        REQUIRE(skep_packed_image_create(&image, &samples[i]));
     }
-    skep_window *window = NULL;
-    REQUIRE(skep_window_create(3, 1, INFINITY, INFINITY, 1e-5, &window));
+    skep_ncc_window *window = NULL;
+    REQUIRE(skep_ncc_window_create(3, 1, INFINITY, INFINITY, 1e-5, &window));
     const double same[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     const double nowhere[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0};
     const double far_away[9] = {1, 0, 1e300, 0, 1, -1e300, 0, 0, 1};
@@ -114,9 +114,9 @@ static void check_known_values(void) {
                                cases[i].pixel, cases[i].homography, 1, &ncc));
         CHECK(fabsf(ncc - cases[i].expected) < 1e-5f, "case %zu: %g", i, ncc);
     }
-    skep_window_destroy(window);
+    skep_ncc_window_destroy(window);
     for (int i = 0; i < 3; ++i) {
-        skep_samples_destroy(samples[i]);
+        skep_packed_image_destroy(samples[i]);
     }
 }
 
@@ -167,9 +167,9 @@ void test_kernels(const char *folder) {
     for (int i = 0; i < 4; ++i) {
         pthread_join(threads[i], NULL);
     }
-    skep_samples_destroy(work->source);
-    skep_samples_destroy(work->reference);
-    skep_window_destroy(work->window);
+    skep_packed_image_destroy(work->source);
+    skep_packed_image_destroy(work->reference);
+    skep_ncc_window_destroy(work->window);
     free(work);
     scene_free(&made);
 }

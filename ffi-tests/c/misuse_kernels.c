@@ -55,24 +55,24 @@ static void check_homographies(const skep_camera *camera) {
 }
 
 static void check_windows(void) {
-    skep_window **out = OUT(skep_window *, 0);
-    FAILS(skep_window_create(5, 2, 5, 0.2, 1e-5, NULL), SKEP_ERR_NULL, "window_out");
-    FAILS(skep_window_create(0, 2, 5, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "radius is 0");
-    FAILS(skep_window_create(17, 2, 5, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "radius is 17");
-    FAILS(skep_window_create(5, 0, 5, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "step is 0");
-    FAILS(skep_window_create(5, 9, 5, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "step is 9");
-    FAILS(skep_window_create(5, 2, 0, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "spatial_sigma");
-    FAILS(skep_window_create(5, 2, NAN, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "spatial_sigma");
-    FAILS(skep_window_create(5, 2, 5, -1, 1e-5, out), SKEP_ERR_ARGUMENT, "colour_sigma");
-    FAILS(skep_window_create(5, 2, 5, 0.2, NAN, out), SKEP_ERR_ARGUMENT, "min_variance");
-    FAILS(skep_window_create(5, 2, 5, 0.2, 2, out), SKEP_ERR_ARGUMENT, "min_variance");
-    skep_window_destroy(NULL);
-    skep_samples_destroy(NULL);
+    skep_ncc_window **out = OUT(skep_ncc_window *, 0);
+    FAILS(skep_ncc_window_create(5, 2, 5, 0.2, 1e-5, NULL), SKEP_ERR_NULL, "window_out");
+    FAILS(skep_ncc_window_create(0, 2, 5, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "radius is 0");
+    FAILS(skep_ncc_window_create(17, 2, 5, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "radius is 17");
+    FAILS(skep_ncc_window_create(5, 0, 5, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "step is 0");
+    FAILS(skep_ncc_window_create(5, 9, 5, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "step is 9");
+    FAILS(skep_ncc_window_create(5, 2, 0, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "sigma_spatial");
+    FAILS(skep_ncc_window_create(5, 2, NAN, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "sigma_spatial");
+    FAILS(skep_ncc_window_create(5, 2, 5, -1, 1e-5, out), SKEP_ERR_ARGUMENT, "sigma_color");
+    FAILS(skep_ncc_window_create(5, 2, 5, 0.2, NAN, out), SKEP_ERR_ARGUMENT, "min_variance");
+    FAILS(skep_ncc_window_create(5, 2, 5, 0.2, 2, out), SKEP_ERR_ARGUMENT, "min_variance");
+    skep_ncc_window_destroy(NULL);
+    skep_packed_image_destroy(NULL);
 }
 
 static void check_correlations(const scene *made) {
-    skep_window *window = make_window();
-    skep_samples *reference = make_samples(made, 0), *source = make_samples(made, 1);
+    skep_ncc_window *window = make_window();
+    skep_packed_image *reference = make_samples(made, 0), *source = make_samples(made, 1);
     const uint32_t w = made->width, h = made->height;
     const uint32_t pixels[4] = {3, 4, w - 1, h - 1}, right[4] = {3, 4, w, 0},
                    below[4] = {0, h, 3, 4};
@@ -102,19 +102,19 @@ static void check_correlations(const scene *made) {
     homographies[13] = 1;
     float ncc[2];
     REQUIRE(skep_patch_ncc(window, reference, source, pixels, homographies, 2, ncc));
-    FAILS(skep_samples_create(NULL, OUT(skep_samples *, 0)), SKEP_ERR_NULL, "image");
+    FAILS(skep_packed_image_create(NULL, OUT(skep_packed_image *, 0)), SKEP_ERR_NULL, "image");
     const skep_image image = scene_image(made, 0);
-    FAILS(skep_samples_create(&image, NULL), SKEP_ERR_NULL, "samples_out");
-    skep_samples_destroy(source);
-    skep_samples_destroy(reference);
-    skep_window_destroy(window);
+    FAILS(skep_packed_image_create(&image, NULL), SKEP_ERR_NULL, "samples_out");
+    skep_packed_image_destroy(source);
+    skep_packed_image_destroy(reference);
+    skep_ncc_window_destroy(window);
 }
 
 /* Cameras and homographies of any finite numbers give numbers. */
 static void check_extremes(const scene *made) {
     static const double SIZES[] = {1e-300, 1e-30, 1e30, 1e300};
-    skep_window *window = make_window();
-    skep_samples *samples = make_samples(made, 0);
+    skep_ncc_window *window = make_window();
+    skep_packed_image *samples = make_samples(made, 0);
     for (int i = 0; i < 4; ++i) {
         for (int j = 0; j < 9; ++j) {
             double homography[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
@@ -128,8 +128,8 @@ static void check_extremes(const scene *made) {
             CHECK(ncc >= -1 && ncc <= 1, "entry %d of size %g: %g", j, -SIZES[i], ncc);
         }
     }
-    skep_samples_destroy(samples);
-    skep_window_destroy(window);
+    skep_packed_image_destroy(samples);
+    skep_ncc_window_destroy(window);
 }
 
 void test_misuse_kernels(const char *folder) {

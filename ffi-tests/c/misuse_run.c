@@ -20,7 +20,7 @@ static void check_runs(const skep_scene *handed_in) {
     REQUIRE(skep_options_set(options, "triangulation_angle.min", 90));
     FAILS(skep_reconstruct(handed_in, options, NULL, NULL, OUT(skep_result *, 0)),
           SKEP_ERR_ARGUMENT, "triangulation_angle.max");
-    FAILS(skep_steps_create(handed_in, options, OUT(skep_steps *, 0)), SKEP_ERR_ARGUMENT,
+    FAILS(skep_stepper_create(handed_in, options, OUT(skep_stepper *, 0)), SKEP_ERR_ARGUMENT,
           "triangulation_angle");
     REQUIRE(skep_options_set(options, "triangulation_angle.min", 4));
     REQUIRE(skep_options_set(options, "focused_views", 1));
@@ -50,9 +50,9 @@ static skep_status get_cost(const skep_result *result, uint32_t view, void *out,
     return skep_result_get_cost(result, view, out, stride_bytes);
 }
 
-static skep_status get_outcome(const skep_result *result, uint32_t view, void *out,
+static skep_status get_status(const skep_result *result, uint32_t view, void *out,
                                size_t stride_bytes) {
-    return skep_result_get_outcome(result, view, out, stride_bytes);
+    return skep_result_get_status(result, view, out, stride_bytes);
 }
 
 static skep_status get_count(const skep_result *result, uint32_t view, void *out,
@@ -70,7 +70,7 @@ static void check_maps(const scene *made, const skep_result *result) {
         get_map *get;
         size_t size;
     } MAPS[] = {{get_depth, 4},   {get_normal, 12}, {get_cost, 4},
-                {get_outcome, 1}, {get_count, 2},   {get_bits, 4}};
+                {get_status, 1}, {get_count, 2},   {get_bits, 4}};
     void *out = OUT(char, 0);
     for (size_t i = 0; i < sizeof MAPS / sizeof MAPS[0]; ++i) {
         const size_t row = MAPS[i].size * made->width;
@@ -122,13 +122,13 @@ static void check_results(const skep_result *result) {
     FAILS(skep_result_get_statistics(result, 0, NULL), SKEP_ERR_NULL, "statistics_out");
     FAILS(skep_result_get_statistics(result, 9, OUT(skep_statistics, 0)), SKEP_ERR_ARGUMENT,
           "view is 9");
-    FAILS(skep_result_get_cycles(NULL, 0, OUT(skep_cycle, 0), 9, OUT(size_t, 2)), SKEP_ERR_NULL,
+    FAILS(skep_result_get_cycles(NULL, 0, OUT(skep_cycle_record, 0), 9, OUT(size_t, 2)), SKEP_ERR_NULL,
           "result");
-    FAILS(skep_result_get_cycles(result, 9, OUT(skep_cycle, 0), 9, OUT(size_t, 2)),
+    FAILS(skep_result_get_cycles(result, 9, OUT(skep_cycle_record, 0), 9, OUT(size_t, 2)),
           SKEP_ERR_ARGUMENT, "view is 9");
-    FAILS(skep_result_get_cycles(result, 0, OUT(skep_cycle, 0), 1, OUT(size_t, 2)),
+    FAILS(skep_result_get_cycles(result, 0, OUT(skep_cycle_record, 0), 1, OUT(size_t, 2)),
           SKEP_ERR_CAPACITY, "cycles");
-    FAILS(skep_result_get_cycles(result, 0, OUT(skep_cycle, 0), 9, NULL), SKEP_ERR_NULL,
+    FAILS(skep_result_get_cycles(result, 0, OUT(skep_cycle_record, 0), 9, NULL), SKEP_ERR_NULL,
           "count_out");
     FAILS(skep_result_borrow_depth(NULL, 0, OUT(const float *, 0)), SKEP_ERR_NULL, "result");
     FAILS(skep_result_borrow_depth(result, 0, NULL), SKEP_ERR_NULL, "depth_out");
@@ -142,9 +142,9 @@ static void check_results(const skep_result *result) {
     FAILS(skep_result_borrow_cost(result, 0, NULL), SKEP_ERR_NULL, "cost_out");
     FAILS(skep_result_borrow_cost(result, 9, OUT(const float *, 0)), SKEP_ERR_ARGUMENT,
           "view is 9");
-    FAILS(skep_result_borrow_outcome(NULL, 0, OUT(const uint8_t *, 0)), SKEP_ERR_NULL, "result");
-    FAILS(skep_result_borrow_outcome(result, 0, NULL), SKEP_ERR_NULL, "outcome_out");
-    FAILS(skep_result_borrow_outcome(result, 9, OUT(const uint8_t *, 0)), SKEP_ERR_ARGUMENT,
+    FAILS(skep_result_borrow_status(NULL, 0, OUT(const uint8_t *, 0)), SKEP_ERR_NULL, "result");
+    FAILS(skep_result_borrow_status(result, 0, NULL), SKEP_ERR_NULL, "status_out");
+    FAILS(skep_result_borrow_status(result, 9, OUT(const uint8_t *, 0)), SKEP_ERR_ARGUMENT,
           "view is 9");
 }
 
@@ -164,7 +164,7 @@ static void check_clouds(const skep_result *result) {
     FAILS(skep_cloud_get_points(cloud, NULL, OUT(float, 1), OUT(uint8_t, 2), less),
           SKEP_ERR_CAPACITY, "normals");
     FAILS(skep_cloud_get_points(cloud, NULL, NULL, OUT(uint8_t, 2), 0), SKEP_ERR_CAPACITY,
-          "colours");
+          "colors");
     REQUIRE(skep_cloud_get_points(cloud, NULL, NULL, NULL, 0));
     FAILS(skep_cloud_get_views(NULL, OUT(uint32_t, 0), count, OUT(uint32_t, 1), total),
           SKEP_ERR_NULL, "cloud");

@@ -46,7 +46,7 @@ static void check_texts(void) {
         CHECK(skep_status_name(status) && strlen(skep_status_name(status)) >= 2, "%d", (int)status);
     }
     CHECK(strcmp(skep_status_name(SKEP_ERR_CAPACITY), "capacity") == 0, "a word");
-    CHECK(strchr(skep_version(), '.') != NULL && strlen(skep_backend_name()) >= 2, "%s",
+    CHECK(strchr(skep_version(), '.') != NULL && strlen(skep_simd_level_name()) >= 2, "%s",
           skep_version());
 }
 
@@ -68,7 +68,7 @@ static void check_options(void) {
                  {"threads", 1.5},         {"threads", -1},       {"threads", 1e9},
                  {"window_radius", 0},     {"window_radius", 17}, {"window_radius", 1e300},
                  {"propagation", 2},       {"propagation", NAN},  {"min_consistent", 0},
-                 {"stop_share", INFINITY}, {"best_views", 9},     {"colour_sigma", 0}};
+                 {"stop_share", INFINITY}, {"best_views", 9},     {"sigma_color", 0}};
     for (size_t i = 0; i < sizeof WRONG / sizeof WRONG[0]; ++i) {
         double before = -1, after = -2;
         REQUIRE(skep_options_get(options, WRONG[i].name, &before));
@@ -120,7 +120,7 @@ static void check_images(skep_scene *handed_in, const skep_image *good, const sk
     image.field = (value);                                                                         \
     FAILS(skep_scene_add_view(handed_in, NULL, &image, camera, OUT(uint32_t, 0)),                  \
           SKEP_ERR_ARGUMENT, word);                                                                \
-    FAILS(skep_samples_create(&image, OUT(skep_samples *, 0)), SKEP_ERR_ARGUMENT, word)
+    FAILS(skep_packed_image_create(&image, OUT(skep_packed_image *, 0)), SKEP_ERR_ARGUMENT, word)
     WRONG_IMAGE(width, 0, "image.width is 0");
     WRONG_IMAGE(height, 0, "image.height is 0");
     WRONG_IMAGE(width, 32769, "image.width");
@@ -139,7 +139,7 @@ static void check_images(skep_scene *handed_in, const skep_image *good, const sk
     FAILS(skep_scene_add_view(handed_in, NULL, &image, camera, OUT(uint32_t, 0)), SKEP_ERR_NULL,
           "image.data");
     const float not_numbers[4] = {0.5f, 0.5f, 0.5f, NAN};
-    const skep_image nan = {not_numbers, 2, 2, 8, SKEP_FORMAT_GREY + SKEP_FORMAT_FLOAT};
+    const skep_image nan = {not_numbers, 2, 2, 8, SKEP_FORMAT_GRAY + SKEP_FORMAT_FLOAT};
     FAILS(skep_scene_add_view(handed_in, NULL, &nan, camera, NULL), SKEP_ERR_ARGUMENT,
           "column 1, row 1");
 }
@@ -287,7 +287,7 @@ static void check_whole_scenes(const scene *made, skep_scene *handed_in) {
         FAILS(skep_scene_validate(handed_in), SKEP_ERR_ARGUMENT, "views[0] (view0000.png).sources");
         FAILS(skep_reconstruct(handed_in, NULL, NULL, NULL, OUT(skep_result *, 0)),
               SKEP_ERR_ARGUMENT, "sources");
-        FAILS(skep_steps_create(handed_in, NULL, OUT(skep_steps *, 0)), SKEP_ERR_ARGUMENT,
+        FAILS(skep_stepper_create(handed_in, NULL, OUT(skep_stepper *, 0)), SKEP_ERR_ARGUMENT,
               "sources");
         FAILS(skep_scene_get_sources(handed_in, NULL, 0, OUT(uint32_t, 0), 9, OUT(size_t, 1)),
               SKEP_ERR_ARGUMENT, "sources");

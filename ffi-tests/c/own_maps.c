@@ -1,5 +1,5 @@
 /*
- * A host's own maps become states: they guide searches, are checked against, and finish as they
+ * A host's own maps become estimates: they guide searches, are checked against, and finish as they
  * are.
  */
 #include "support/check.h"
@@ -11,17 +11,17 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-static skep_state *true_state(const scene *made, const skep_steps *steps, uint32_t step,
+static skep_estimate *true_state(const scene *made, const skep_stepper *stepper, uint32_t step,
                               uint32_t view) {
     const photograph *truth = &made->photographs[view];
-    skep_state *state = NULL;
-    REQUIRE(skep_state_from_maps(steps, step, view, truth->depth, 4 * made->width, truth->normal,
-                                 12 * made->width, NULL, 0, NULL, 0, &state));
-    return state;
+    skep_estimate *estimate = NULL;
+    REQUIRE(skep_estimate_from_maps(stepper, step, view, truth->depth, 4 * made->width, truth->normal,
+                                 12 * made->width, NULL, 0, NULL, 0, &estimate));
+    return estimate;
 }
 
 /* What goes in comes out, with masks of validity, costs, and rows apart. */
-static void check_round_trip(const scene *made, const skep_steps *steps, uint32_t step) {
+static void check_round_trip(const scene *made, const skep_stepper *stepper, uint32_t step) {
     const size_t pixels = scene_pixels(made), width = made->width, stride = width + 2;
     const photograph *truth = &made->photographs[2];
     float *depth = take(stride * made->height, sizeof *depth);
@@ -34,11 +34,11 @@ static void check_round_trip(const scene *made, const skep_steps *steps, uint32_
         validated[i] = i % 3 ? 0 : (uint8_t)(i % 255 + 1);
         valid += i % 5 && validated[i];
     }
-    skep_state *state = NULL;
-    REQUIRE(skep_state_from_maps(steps, step, 2, depth, 4 * stride, truth->normal, 12 * width,
-                                 validated, width, cost, 4 * width, &state));
-    skep_state_info info;
-    REQUIRE(skep_state_get_info(state, &info));
+    skep_estimate *estimate = NULL;
+    REQUIRE(skep_estimate_from_maps(stepper, step, 2, depth, 4 * stride, truth->normal, 12 * width,
+                                 validated, width, cost, 4 * width, &estimate));
+    skep_estimate_info info;
+    REQUIRE(skep_estimate_get_info(estimate, &info));
     CHECK(info.view == 2 && info.step == step && info.is_checked == 1 && info.reserved == 0,
           "what it is");
     CHECK(info.pixels == pixels && info.validated == valid, "%llu validated",
@@ -48,8 +48,8 @@ static void check_round_trip(const scene *made, const skep_steps *steps, uint32_
           *normal_back = take(pixels, 3 * sizeof(float));
     float *cost_back = take(pixels, sizeof *cost_back);
     uint8_t *validated_back = take(pixels, 1);
-    REQUIRE(skep_state_get_maps(state, depth_back, normal_back, cost_back, validated_back, pixels));
-    REQUIRE(skep_state_get_maps(state, NULL, NULL, NULL, NULL, 0));
+    REQUIRE(skep_estimate_get_maps(estimate, depth_back, normal_back, cost_back, validated_back, pixels));
+    REQUIRE(skep_estimate_get_maps(estimate, NULL, NULL, NULL, NULL, 0));
     for (size_t i = 0; i < pixels; ++i) {
         const int is_there = i % 5 != 0;
         CHECK(depth_back[i] == (is_there ? truth->depth[i] : 0), "pixel %zu", i);
@@ -60,7 +60,7 @@ static void check_round_trip(const scene *made, const skep_steps *steps, uint32_
                   "pixel %zu", i);
         }
     }
-    skep_state_destroy(state);
+    skep_estimate_destroy(estimate);
     free(validated_back);
     free(cost_back);
     free(normal_back);
@@ -80,54 +80,54 @@ static size_t right(const photograph *truth, const float *depth, size_t pixels) 
 }
 
 /* A view with no state of its own takes the planes that the others' true maps offer it. */
-static void check_guidance(const scene *made, const skep_steps *steps, uint32_t step,
-                           skep_state **states) {
+static void check_guidance(const scene *made, const skep_stepper *stepper, uint32_t step,
+                           skep_estimate **estimates) {
     const size_t pixels = scene_pixels(made);
     const photograph *truth = &made->photographs[0];
     float *nothing = take(pixels, sizeof *nothing), *depth = take(pixels, sizeof *depth);
-    skep_state *true_own = states[0];
-    states[0] = NULL;
-    REQUIRE(skep_state_from_maps(steps, step, 0, nothing, 4 * made->width, truth->normal,
-                                 12 * made->width, NULL, 0, NULL, 0, &states[0]));
+    skep_estimate *true_own = estimates[0];
+    estimates[0] = NULL;
+    REQUIRE(skep_estimate_from_maps(stepper, step, 0, nothing, 4 * made->width, truth->normal,
+                                 12 * made->width, NULL, 0, NULL, 0, &estimates[0]));
     size_t found[2];
     for (int is_offered = 0; is_offered < 2; ++is_offered) {
-        skep_offers *offers = NULL;
-        skep_state *searched = NULL;
-        REQUIRE(skep_steps_propagate(steps, step, 0, (const skep_state *const *)states, made->views,
-                                     &offers));
-        REQUIRE(skep_steps_search(steps, step, 0, (const skep_state *const *)states, made->views,
-                                  is_offered ? offers : NULL, NULL, NULL, &searched));
-        REQUIRE(skep_state_get_maps(searched, depth, NULL, NULL, NULL, pixels));
+        skep_candidates *candidates = NULL;
+        skep_estimate *searched = NULL;
+        REQUIRE(skep_stepper_propagate(stepper, step, 0, (const skep_estimate *const *)estimates, made->views,
+                                     &candidates));
+        REQUIRE(skep_stepper_search(stepper, step, 0, (const skep_estimate *const *)estimates, made->views,
+                                  is_offered ? candidates : NULL, NULL, NULL, &searched));
+        REQUIRE(skep_estimate_get_maps(searched, depth, NULL, NULL, NULL, pixels));
         found[is_offered] = right(truth, depth, pixels);
-        skep_state_info info;
-        REQUIRE(skep_state_get_info(searched, &info));
+        skep_estimate_info info;
+        REQUIRE(skep_estimate_get_info(searched, &info));
         CHECK(info.is_checked == 0 && info.validated == 0 && info.ncc_evaluations > pixels,
               "searched");
-        skep_state_destroy(searched);
-        skep_offers_destroy(offers);
+        skep_estimate_destroy(searched);
+        skep_candidates_destroy(candidates);
     }
     size_t away_from_edges = 0;
     for (size_t i = 0; i < pixels; ++i) {
         away_from_edges += truth->surface[i] != 0;
     }
-    printf("right of %zu: %zu without offers, %zu with\n", away_from_edges, found[0], found[1]);
-    CHECK(found[1] > found[0], "%zu with offers, %zu without", found[1], found[0]);
+    printf("right of %zu: %zu without candidates, %zu with\n", away_from_edges, found[0], found[1]);
+    CHECK(found[1] > found[0], "%zu with candidates, %zu without", found[1], found[0]);
     CHECK(found[1] * 10 > away_from_edges * 7, "%zu of %zu pixels", found[1], away_from_edges);
-    skep_state_destroy(states[0]);
-    states[0] = true_own;
+    skep_estimate_destroy(estimates[0]);
+    estimates[0] = true_own;
     free(depth);
     free(nothing);
 }
 
 /* Finished as they are, true maps match well and are all validated. */
-static void check_finished(const scene *made, const skep_steps *steps, skep_state **states) {
+static void check_finished(const scene *made, const skep_stepper *stepper, skep_estimate **estimates) {
     const size_t pixels = scene_pixels(made);
     skep_result *result = NULL;
-    REQUIRE(skep_steps_finish(steps, 1, (const skep_state *const *)states, made->views, NULL, NULL,
+    REQUIRE(skep_stepper_finish(stepper, 1, (const skep_estimate *const *)estimates, made->views, NULL, NULL,
                               &result));
     view_maps maps = maps_of(result, 1);
     CHECK(same_bytes(maps.depth[0], made->photographs[1].depth, 4 * pixels), "the maps given");
-    CHECK(maps.statistics.pixels[SKEP_PIXEL_VALIDATED] == pixels, "all are validated");
+    CHECK(maps.statistics.status_counts[SKEP_PIXEL_VALIDATED] == pixels, "all are validated");
     double sum = 0;
     for (size_t i = 0; i < pixels; ++i) {
         sum += maps.cost[i];
@@ -141,16 +141,16 @@ static void check_finished(const scene *made, const skep_steps *steps, skep_stat
 /* Averaged between views, true maps stay true: the views agree. */
 static void check_averaged(const scene *made, const skep_scene *handed_in, skep_options *options) {
     REQUIRE(skep_options_set(options, "average_views", 1));
-    skep_steps *steps = NULL;
+    skep_stepper *stepper = NULL;
     uint32_t count = 0;
-    REQUIRE(skep_steps_create(handed_in, options, &steps));
-    REQUIRE(skep_steps_get_count(steps, &count, NULL));
-    skep_state *states[MAX_VIEWS] = {NULL};
+    REQUIRE(skep_stepper_create(handed_in, options, &stepper));
+    REQUIRE(skep_stepper_get_count(stepper, &count, NULL));
+    skep_estimate *estimates[MAX_VIEWS] = {NULL};
     for (uint32_t view = 0; view < made->views; ++view) {
-        states[view] = true_state(made, steps, count - 1, view);
+        estimates[view] = true_state(made, stepper, count - 1, view);
     }
     skep_result *result = NULL;
-    REQUIRE(skep_steps_finish(steps, 1, (const skep_state *const *)states, made->views, NULL, NULL,
+    REQUIRE(skep_stepper_finish(stepper, 1, (const skep_estimate *const *)estimates, made->views, NULL, NULL,
                               &result));
     view_maps maps = maps_of(result, 1);
     const photograph *truth = &made->photographs[1];
@@ -164,9 +164,9 @@ static void check_averaged(const scene *made, const skep_scene *handed_in, skep_
     maps_free(&maps);
     skep_result_destroy(result);
     for (uint32_t view = 0; view < made->views; ++view) {
-        skep_state_destroy(states[view]);
+        skep_estimate_destroy(estimates[view]);
     }
-    skep_steps_destroy(steps);
+    skep_stepper_destroy(stepper);
 }
 
 void test_own_maps(const char *folder) {
@@ -176,26 +176,26 @@ void test_own_maps(const char *folder) {
     skep_options *options = quick_options();
     REQUIRE(skep_options_set(options, "average_views", 0));
     skep_scene *handed_in = scene_hand_in(&made);
-    skep_steps *steps = NULL;
+    skep_stepper *stepper = NULL;
     uint32_t count = 0;
-    REQUIRE(skep_steps_create(handed_in, options, &steps));
-    REQUIRE(skep_steps_get_count(steps, &count, NULL));
+    REQUIRE(skep_stepper_create(handed_in, options, &stepper));
+    REQUIRE(skep_stepper_get_count(stepper, &count, NULL));
     check_averaged(&made, handed_in, options);
-    /* Steps need neither scene nor options any more. */
+    /* Stepper need neither scene nor options any more. */
     skep_options_destroy(options);
     skep_scene_destroy(handed_in);
     const uint32_t last = count - 1;
-    check_round_trip(&made, steps, last);
+    check_round_trip(&made, stepper, last);
 
-    skep_state *states[MAX_VIEWS] = {NULL};
+    skep_estimate *estimates[MAX_VIEWS] = {NULL};
     for (uint32_t view = 0; view < made.views; ++view) {
-        states[view] = true_state(&made, steps, last, view);
+        estimates[view] = true_state(&made, stepper, last, view);
     }
-    check_guidance(&made, steps, last, states);
-    check_finished(&made, steps, states);
-    skep_steps_destroy(steps);
+    check_guidance(&made, stepper, last, estimates);
+    check_finished(&made, stepper, estimates);
+    skep_stepper_destroy(stepper);
     for (uint32_t view = 0; view < made.views; ++view) {
-        skep_state_destroy(states[view]);
+        skep_estimate_destroy(estimates[view]);
     }
     scene_free(&made);
 }

@@ -31,12 +31,12 @@ int main(int count, char **arguments) {
         (void)lost;
     } else if (strcmp(error, "library-overflow") == 0) {
         /* The library reads memory that is smaller than was said. */
-        skep_samples *samples = NULL;
+        skep_packed_image *samples = NULL;
         unsigned char *pixels = malloc(12);
-        const skep_image image = {pixels, 4, 4, 4, SKEP_FORMAT_GREY};
+        const skep_image image = {pixels, 4, 4, 4, SKEP_FORMAT_GRAY};
         memset(pixels, 7, 12);
-        printf("%d\n", (int)skep_samples_create(&image, &samples));
-        skep_samples_destroy(samples);
+        printf("%d\n", (int)skep_packed_image_create(&image, &samples));
+        skep_packed_image_destroy(samples);
         free(pixels);
     } else if (strcmp(error, "undefined") == 0) {
         place = INT_MAX;

@@ -5,7 +5,7 @@
 void test_whole(const char *folder);
 void test_formats(const char *folder);
 void test_inputs(const char *folder);
-void test_steps(const char *folder);
+void test_stepper(const char *folder);
 void test_own_maps(const char *folder);
 void test_kernels(const char *folder);
 void test_cancel(const char *folder);
@@ -13,8 +13,8 @@ void test_threads(const char *folder);
 void test_files(const char *folder);
 void test_misuse_scene(const char *folder);
 void test_misuse_run(const char *folder);
-void test_misuse_steps(const char *folder);
-void test_misuse_states(const char *folder);
+void test_misuse_stepper(const char *folder);
+void test_misuse_estimates(const char *folder);
 void test_misuse_kernels(const char *folder);
 void test_misuse_files(const char *folder);
 

@@ -17,7 +17,7 @@ typedef struct shared {
     const scene *made;
     skep_scene *handed_in;
     skep_options *options;
-    skep_steps *steps;
+    skep_stepper *stepper;
     skep_result *expected;
 } shared;
 
@@ -63,23 +63,23 @@ static void *run_shared(void *argument) {
     return NULL;
 }
 
-/* Views of the same steps are searched at the same time. */
+/* Views of the same stepper are searched at the same time. */
 static void *search_shared(void *argument) {
     const worker *self = argument;
-    skep_state *first = NULL, *second = NULL;
-    REQUIRE(skep_steps_search(self->all->steps, 0, 0, NULL, 0, NULL, NULL, NULL, &first));
-    REQUIRE(skep_steps_search(self->all->steps, 0, 0, NULL, 0, NULL, NULL, NULL, &second));
-    skep_state_info info;
-    REQUIRE(skep_state_get_info(first, &info));
+    skep_estimate *first = NULL, *second = NULL;
+    REQUIRE(skep_stepper_search(self->all->stepper, 0, 0, NULL, 0, NULL, NULL, NULL, &first));
+    REQUIRE(skep_stepper_search(self->all->stepper, 0, 0, NULL, 0, NULL, NULL, NULL, &second));
+    skep_estimate_info info;
+    REQUIRE(skep_estimate_get_info(first, &info));
     const size_t pixels = (size_t)info.pixels;
     float *a = take(pixels, sizeof *a), *b = take(pixels, sizeof *b);
-    REQUIRE(skep_state_get_maps(first, a, NULL, NULL, NULL, pixels));
-    REQUIRE(skep_state_get_maps(second, b, NULL, NULL, NULL, pixels));
+    REQUIRE(skep_estimate_get_maps(first, a, NULL, NULL, NULL, pixels));
+    REQUIRE(skep_estimate_get_maps(second, b, NULL, NULL, NULL, pixels));
     CHECK(same_bytes(a, b, pixels * sizeof *a), "thread %d", self->number);
     free(b);
     free(a);
-    skep_state_destroy(second);
-    skep_state_destroy(first);
+    skep_estimate_destroy(second);
+    skep_estimate_destroy(first);
     return NULL;
 }
 
@@ -113,12 +113,12 @@ void test_threads(const char *folder) {
     scene_make(&made);
     shared all = {.made = &made, .handed_in = scene_hand_in(&made), .options = quick_options()};
     all.expected = scene_run(all.handed_in, all.options);
-    REQUIRE(skep_steps_create(all.handed_in, all.options, &all.steps));
+    REQUIRE(skep_stepper_create(all.handed_in, all.options, &all.stepper));
     static void *(*const KINDS[])(void *) = {run_own,       run_own,      run_own,
                                              run_shared,    run_shared,   search_shared,
                                              search_shared, change_shared};
     run_together(&all, KINDS, scene_is_small() ? 2 : 8);
-    skep_steps_destroy(all.steps);
+    skep_stepper_destroy(all.stepper);
     skep_result_destroy(all.expected);
     skep_options_destroy(all.options);
     skep_scene_destroy(all.handed_in);

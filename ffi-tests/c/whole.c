@@ -64,14 +64,14 @@ static void check_agreement(const skep_camera *camera, const view_maps *maps) {
         const float ray[3] = {(float)((x - camera->cx) / camera->fx),
                               (float)((y - camera->cy) / camera->fy), 1};
         const float depth = maps->depth[SKEP_MAPS_RAW][i];
-        ++counts[maps->outcome[i] & 7];
-        CHECK(maps->outcome[i] <= SKEP_PIXEL_OUT_OF_RANGE, "%u at %zu, %zu", maps->outcome[i], x,
+        ++counts[maps->status[i] & 7];
+        CHECK(maps->status[i] <= SKEP_PIXEL_OUT_OF_RANGE, "%u at %zu, %zu", maps->status[i], x,
               y);
         CHECK(depth == 0 || (depth >= (float)SCENE_NEAR / 2 && depth <= (float)SCENE_FAR * 2), "%g",
               depth);
         CHECK(depth == 0 || fabs(dot3(raw, raw) - 1) < 1e-5, "%g", dot3(raw, raw));
         CHECK(depth == 0 || dot3(raw, ray) < 0, "a normal that faces away at %zu, %zu", x, y);
-        const int is_validated = maps->outcome[i] == SKEP_PIXEL_VALIDATED;
+        const int is_validated = maps->status[i] == SKEP_PIXEL_VALIDATED;
         CHECK(maps->depth[SKEP_MAPS_VALIDATED][i] == (is_validated ? depth : 0), "at %zu, %zu", x,
               y);
         const float none[3] = {0, 0, 0};
@@ -81,23 +81,23 @@ static void check_agreement(const skep_camera *camera, const view_maps *maps) {
         CHECK((maps->source_bits[i] & ~all) == 0, "%x of %zu sources",
               (unsigned)maps->source_bits[i], maps->source_total);
     }
-    CHECK(same_bytes(counts, maps->statistics.pixels, sizeof counts), "outcomes are counted");
+    CHECK(same_bytes(counts, maps->statistics.status_counts, sizeof counts), "outcomes are counted");
     CHECK(maps->statistics.ncc_evaluations > pixels, "%llu",
           (unsigned long long)maps->statistics.ncc_evaluations);
     CHECK(maps->statistics.samples > maps->statistics.ncc_evaluations,
           "patches have several samples");
-    CHECK(maps->statistics.early_outs > 0, "some hypotheses are given up early");
+    CHECK(maps->statistics.early_terminations > 0, "some hypotheses are given up early");
     CHECK(maps->cycle_total >= 2, "%zu", maps->cycle_total);
     for (size_t i = 0; i < maps->cycle_total; ++i) {
-        const skep_cycle *cycle = &maps->cycles[i];
+        const skep_cycle_record *cycle = &maps->cycles[i];
         CHECK(cycle->changed <= cycle->pixels && cycle->validated <= cycle->pixels, "cycle %zu", i);
-        CHECK(i == 0 || cycle->reduction < cycle[-1].reduction ||
-                  (cycle->reduction == cycle[-1].reduction && cycle->cycle == cycle[-1].cycle + 1),
+        CHECK(i == 0 || cycle->downscale < cycle[-1].downscale ||
+                  (cycle->downscale == cycle[-1].downscale && cycle->cycle == cycle[-1].cycle + 1),
               "cycle %zu", i);
     }
-    const skep_cycle *last = &maps->cycles[maps->cycle_total - 1];
+    const skep_cycle_record *last = &maps->cycles[maps->cycle_total - 1];
     /* Closing what is left open makes validated pixels, and finishing takes none away. */
-    CHECK(last->reduction == 1 && last->validated <= counts[SKEP_PIXEL_VALIDATED],
+    CHECK(last->downscale == 1 && last->validated <= counts[SKEP_PIXEL_VALIDATED],
           "the last cycle's check found %llu, the map has %llu",
           (unsigned long long)last->validated, (unsigned long long)counts[SKEP_PIXEL_VALIDATED]);
 }
@@ -107,7 +107,7 @@ static void check_strides(const skep_result *result, uint32_t view, const view_m
     const size_t width = maps->width, height = maps->height;
     const size_t sizes[] = {4, 12, 4, 1, 2, 4};
     const void *dense[] = {maps->depth[0], maps->normal[0],    maps->cost,
-                           maps->outcome,  maps->source_count, maps->source_bits};
+                           maps->status,  maps->source_count, maps->source_bits};
     for (int kind = 0; kind < 6; ++kind) {
         const size_t row = width * sizes[kind], stride = row + 7;
         guarded memory = guarded_take(rows_size(row, height, stride));
@@ -118,7 +118,7 @@ static void check_strides(const skep_result *result, uint32_t view, const view_m
         case 0: status = skep_result_get_depth(result, view, SKEP_MAPS_RAW, out, stride); break;
         case 1: status = skep_result_get_normal(result, view, SKEP_MAPS_RAW, out, stride); break;
         case 2: status = skep_result_get_cost(result, view, out, stride); break;
-        case 3: status = skep_result_get_outcome(result, view, out, stride); break;
+        case 3: status = skep_result_get_status(result, view, out, stride); break;
         case 4: status = skep_result_get_source_count(result, view, out, stride); break;
         case 5: status = skep_result_get_source_bits(result, view, 0, out, stride); break;
         }
@@ -131,25 +131,25 @@ static void check_strides(const skep_result *result, uint32_t view, const view_m
         guarded_free(&memory);
     }
     const float *depth, *normal, *cost;
-    const uint8_t *outcome;
+    const uint8_t *status;
     REQUIRE(skep_result_borrow_depth(result, view, &depth));
     REQUIRE(skep_result_borrow_normal(result, view, &normal));
     REQUIRE(skep_result_borrow_cost(result, view, &cost));
-    REQUIRE(skep_result_borrow_outcome(result, view, &outcome));
+    REQUIRE(skep_result_borrow_status(result, view, &status));
     CHECK(same_bytes(depth, maps->depth[0], 4 * width * height), "borrowed depths");
     CHECK(same_bytes(normal, maps->normal[0], 12 * width * height), "borrowed normals");
     CHECK(same_bytes(cost, maps->cost, 4 * width * height), "borrowed costs");
-    CHECK(same_bytes(outcome, maps->outcome, width * height), "borrowed outcomes");
+    CHECK(same_bytes(status, maps->status, width * height), "borrowed outcomes");
 }
 
 /*
- * Points lie on the surfaces, their views see them, and their colours are those of the photographs.
+ * Points lie on the surfaces, their views see them, and their colors are those of the photographs.
  * /
  */
 static void check_cloud(const scene *made, const skep_result *result) {
     points cloud = points_of_result(result);
     CHECK(scene_is_small() || cloud.count > scene_pixels(made) / 2, "%zu points", cloud.count);
-    size_t next = 0, on_surface = 0, right_colour = 0;
+    size_t next = 0, on_surface = 0, right_color = 0;
     for (size_t i = 0; i < cloud.count; ++i) {
         const float *n = cloud.normals + 3 * i;
         CHECK(fabs(dot3(n, n) - 1) < 1e-5, "point %zu has a normal of square %g", i, dot3(n, n));
@@ -175,20 +175,20 @@ static void check_cloud(const scene *made, const skep_result *result) {
             int most = 0;
             for (int channel = 0; channel < 3; ++channel) {
                 const int away =
-                    abs(cloud.colours[3 * i + channel] - first->rgb[3 * pixel + channel]);
+                    abs(cloud.colors[3 * i + channel] - first->rgb[3 * pixel + channel]);
                 most = away > most ? away : most;
             }
-            right_colour += most < 40;
+            right_color += most < 40;
         }
         next += cloud.view_counts[i];
     }
-    printf("%zu points, %zu within 2 %%, %zu of the right colour\n", cloud.count, on_surface,
-           right_colour);
+    printf("%zu points, %zu within 2 %%, %zu of the right color\n", cloud.count, on_surface,
+           right_color);
     CHECK(next == cloud.view_total, "%zu of %zu views", next, cloud.view_total);
     CHECK(scene_is_small() || on_surface * 10 > cloud.count * 9, "%zu of %zu points", on_surface,
           cloud.count);
-    CHECK(scene_is_small() || right_colour * 10 > cloud.count * 9, "%zu of %zu points",
-          right_colour, cloud.count);
+    CHECK(scene_is_small() || right_color * 10 > cloud.count * 9, "%zu of %zu points",
+          right_color, cloud.count);
     points_free(&cloud);
 }
 

@@ -23,9 +23,9 @@ double our_angle(const skep_scene *scene, uint32_t a, uint32_t b)
     return degrees;
 }
 
-Eigen::Vector3d centre_of(const scene::View &view)
+Eigen::Vector3d center_of(const scene::View &view)
 {
-    return Eigen::Vector3d(scene::centre(view.camera).data());
+    return Eigen::Vector3d(scene::center(view.camera).data());
 }
 
 // COLMAP's angles, in degrees, at all points that both views saw.
@@ -39,7 +39,7 @@ std::vector<double> their_angles(const scene::Scene &made, uint32_t a, uint32_t 
         if (saw(a) && saw(b)) {
             const Eigen::Vector3d position(point.position.data());
             angles.push_back(colmap::RadToDeg(colmap::CalculateTriangulationAngle(
-                centre_of(made.views[a]), centre_of(made.views[b]), position)));
+                center_of(made.views[a]), center_of(made.views[b]), position)));
         }
     }
     return angles;

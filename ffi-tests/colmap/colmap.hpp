@@ -13,7 +13,7 @@
 #include <random>
 #include <string>
 
-// COLMAP puts the centre of the top-left pixel at (0.5, 0.5), the library at (0, 0).
+// COLMAP puts the center of the top-left pixel at (0.5, 0.5), the library at (0, 0).
 const double half_pixel = 0.5;
 
 inline Eigen::Matrix3d rotation_of(const skep_camera &camera)

@@ -88,7 +88,7 @@ Spread to_surface(const Cloud &points)
     return spread_of(distances);
 }
 
-// The workspace with a model that says what COLMAP's fusion, which puts pixel centres at whole
+// The workspace with a model that says what COLMAP's fusion, which puts pixel centers at whole
 // numbers, takes it to say.
 std::string with_whole_pixels(const std::string &folder)
 {
@@ -163,7 +163,7 @@ int main()
         compare("COLMAP's settings", ours, fuse_with_colmap(workspace.folder, defaults), coarse);
 
         // With settings that mean what ours do the clouds differ by little more than the half pixel
-        // by which its fusion is off: it puts the centres of pixels at whole numbers, against
+        // by which its fusion is off: it puts the centers of pixels at whole numbers, against
         // COLMAP's own convention.
         colmap::mvs::StereoFusionOptions like_ours = defaults;
         like_ours.min_num_pixels = 4;

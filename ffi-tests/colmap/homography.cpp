@@ -87,23 +87,23 @@ void formulas_agree()
     EXPECT(without_shift > 1e-7);
 }
 
-struct Grey {
+struct Gray {
     uint32_t width;
     uint32_t height;
     std::vector<uint8_t> values;
 };
 
-Grey grey_of(const scene::View &view)
+Gray gray_of(const scene::View &view)
 {
-    Grey grey = {view.width, view.height, {}};
+    Gray gray = {view.width, view.height, {}};
     for (size_t pixel = 0; pixel < view.rgb.size(); pixel += 3) {
-        grey.values.push_back((view.rgb[pixel] + view.rgb[pixel + 1] + view.rgb[pixel + 2]) / 3);
+        gray.values.push_back((view.rgb[pixel] + view.rgb[pixel + 1] + view.rgb[pixel + 2]) / 3);
     }
-    return grey;
+    return gray;
 }
 
 // COLMAP's warp of an image by a homography, into the pixels of another.
-Grey warp(const Grey &image, const Matrix &homography, uint32_t width, uint32_t height)
+Gray warp(const Gray &image, const Matrix &homography, uint32_t width, uint32_t height)
 {
     colmap::Bitmap source, target;
     source.Allocate(image.width, image.height, false);
@@ -113,33 +113,33 @@ Grey warp(const Grey &image, const Matrix &homography, uint32_t width, uint32_t 
                         colmap::BitmapColor<uint8_t>(image.values[pixel]));
     }
     colmap::WarpImageWithHomography(homography, source, &target);
-    Grey warped = {width, height, {}};
+    Gray warped = {width, height, {}};
     for (size_t pixel = 0; pixel < size_t{width} * height; ++pixel) {
-        colmap::BitmapColor<uint8_t> colour;
-        target.GetPixel(pixel % width, pixel / width, &colour);
-        warped.values.push_back(colour.r);
+        colmap::BitmapColor<uint8_t> color;
+        target.GetPixel(pixel % width, pixel / width, &color);
+        warped.values.push_back(color.r);
     }
     return warped;
 }
 
 // The library's correlation of patches at these pixels.
-std::vector<float> correlate(const Grey &reference, const Grey &source,
+std::vector<float> correlate(const Gray &reference, const Gray &source,
                              const std::vector<uint32_t> &pixels, const Matrix &homography)
 {
-    Owned<skep_samples> samples[] = {{nullptr, skep_samples_destroy},
-                                     {nullptr, skep_samples_destroy}};
-    const Grey *images[] = {&reference, &source};
+    Owned<skep_packed_image> samples[] = {{nullptr, skep_packed_image_destroy},
+                                     {nullptr, skep_packed_image_destroy}};
+    const Gray *images[] = {&reference, &source};
     for (int side = 0; side < 2; ++side) {
-        const Grey &grey = *images[side];
-        const skep_image image = {grey.values.data(), grey.width, grey.height, grey.width,
-                                  SKEP_FORMAT_GREY};
-        skep_samples *made = nullptr;
-        must(skep_samples_create(&image, &made));
+        const Gray &gray = *images[side];
+        const skep_image image = {gray.values.data(), gray.width, gray.height, gray.width,
+                                  SKEP_FORMAT_GRAY};
+        skep_packed_image *made = nullptr;
+        must(skep_packed_image_create(&image, &made));
         samples[side].reset(made);
     }
-    skep_window *window = nullptr;
-    must(skep_window_create(5, 1, 3, 0.1, 1e-5, &window));
-    const Owned<skep_window> owned(window, skep_window_destroy);
+    skep_ncc_window *window = nullptr;
+    must(skep_ncc_window_create(5, 1, 3, 0.1, 1e-5, &window));
+    const Owned<skep_ncc_window> owned(window, skep_ncc_window_destroy);
     const size_t count = pixels.size() / 2;
     const RowMajor row_major = homography;
     std::vector<double> homographies;
@@ -153,16 +153,16 @@ std::vector<float> correlate(const Grey &reference, const Grey &source,
 }
 
 // A patch and its image by a homography correlate as the patch and what lies at the same place in
-// the image that COLMAP warped by that homography; but that image is rounded to whole grey values.
+// the image that COLMAP warped by that homography; but that image is rounded to whole gray values.
 void warps_agree()
 {
     const scene::Scene made = scene::make();
     const scene::View &reference = made.views[0];
-    const Grey reference_grey = grey_of(reference);
+    const Gray reference_gray = gray_of(reference);
     for (const uint32_t other : {1u, 4u}) {
         const scene::View &source = made.views[other];
         std::printf("warp of %s to %s\n", source.name.c_str(), reference.name.c_str());
-        const Grey source_grey = grey_of(source);
+        const Gray source_gray = gray_of(source);
         // A plane about where the wall is.
         skep_plane plane;
         const double normal[] = {-0.2, -0.1, -std::sqrt(0.95)};
@@ -187,11 +187,11 @@ void warps_agree()
                 }
             }
         }
-        const std::vector<float> direct = correlate(reference_grey, source_grey, pixels, ours);
+        const std::vector<float> direct = correlate(reference_gray, source_gray, pixels, ours);
         const auto difference = [&](const Matrix &homography) {
-            const Grey warped = warp(source_grey, homography, reference.width, reference.height);
+            const Gray warped = warp(source_gray, homography, reference.width, reference.height);
             const std::vector<float> indirect =
-                correlate(reference_grey, warped, pixels, Matrix::Identity());
+                correlate(reference_gray, warped, pixels, Matrix::Identity());
             double largest = 0;
             for (size_t patch = 0; patch < direct.size(); ++patch) {
                 largest = std::max(largest, std::abs(double(direct[patch]) - indirect[patch]));

@@ -235,10 +235,10 @@ void the_cloud_is_the_same(const scene::Workspace &workspace)
     must(skep_cloud_get_count(workspace.cloud.get(), &count, &view_total));
     std::vector<double> positions(3 * count);
     std::vector<float> normals(3 * count);
-    std::vector<uint8_t> colours(3 * count);
+    std::vector<uint8_t> colors(3 * count);
     std::vector<uint32_t> view_counts(count), views(view_total);
     must(skep_cloud_get_points(workspace.cloud.get(), positions.data(), normals.data(),
-                               colours.data(), count));
+                               colors.data(), count));
     must(skep_cloud_get_views(workspace.cloud.get(), view_counts.data(), count, views.data(),
                               view_total));
 
@@ -250,11 +250,11 @@ void the_cloud_is_the_same(const scene::Workspace &workspace)
         const colmap::PlyPoint &point = points[index];
         const float place[] = {point.x, point.y, point.z},
                     normal[] = {point.nx, point.ny, point.nz};
-        const uint8_t colour[] = {point.r, point.g, point.b};
+        const uint8_t color[] = {point.r, point.g, point.b};
         for (int axis = 0; axis < 3; ++axis) {
             differing += place[axis] != static_cast<float>(positions[3 * index + axis]) ||
                          normal[axis] != normals[3 * index + axis] ||
-                         colour[axis] != colours[3 * index + axis];
+                         color[axis] != colors[3 * index + axis];
         }
     }
     EXPECT(differing == 0);

@@ -11,7 +11,7 @@ namespace {
 // The surfaces, in world units: the wall is the plane wall_normal . X = wall_distance.
 const Vector wall_normal = {0.2 / std::sqrt(1.08), 0.2 / std::sqrt(1.08), 1 / std::sqrt(1.08)};
 const double wall_distance = 4.8;
-const Vector ball_centre = {0.7, -0.25, 3.9};
+const Vector ball_center = {0.7, -0.25, 3.9};
 const double ball_radius = 0.6;
 const Vector box_low = {-1.2, -0.3, 3.7};
 const Vector box_high = {-0.3, 0.6, 4.5};
@@ -36,7 +36,7 @@ double first_hit(const Vector &from, const Vector &direction)
 {
     double nearest = (wall_distance - dot(wall_normal, from)) / dot(wall_normal, direction);
 
-    const Vector to_ball = plus(ball_centre, from, -1);
+    const Vector to_ball = plus(ball_center, from, -1);
     const double along = dot(to_ball, direction), square = dot(direction, direction);
     const double root =
         along * along - square * (dot(to_ball, to_ball) - ball_radius * ball_radius);
@@ -121,7 +121,7 @@ skep_camera look(const Vector &from, const Vector &at, double turn)
 
 void photograph(View &view)
 {
-    const Vector from = centre(view.camera);
+    const Vector from = center(view.camera);
     const int grid = 3;
     view.rgb.clear();
     for (uint32_t y = 0; y < view.height; ++y) {
@@ -144,7 +144,7 @@ void photograph(View &view)
 
 bool sees(const View &view, const Vector &point)
 {
-    const Vector pixel = project(view.camera, point), from = centre(view.camera);
+    const Vector pixel = project(view.camera, point), from = center(view.camera);
     const bool inside =
         pixel[0] >= 0 && pixel[1] >= 0 && pixel[0] <= view.width - 1 && pixel[1] <= view.height - 1;
     return inside && first_hit(from, plus(point, from, -1)) > 1 - 1e-6;
@@ -152,7 +152,7 @@ bool sees(const View &view, const Vector &point)
 
 } // namespace
 
-Vector centre(const skep_camera &camera)
+Vector center(const skep_camera &camera)
 {
     Vector place;
     for (int axis = 0; axis < 3; ++axis) {
@@ -178,7 +178,7 @@ Vector project(const skep_camera &camera, const Vector &point)
 double distance_to_surface(const Vector &point)
 {
     const double wall = std::abs(dot(wall_normal, point) - wall_distance);
-    const Vector from_ball = plus(point, ball_centre, -1);
+    const Vector from_ball = plus(point, ball_center, -1);
     const double ball = std::abs(std::sqrt(dot(from_ball, from_ball)) - ball_radius);
     double outside = 0, inside = -std::numeric_limits<double>::infinity();
     for (int axis = 0; axis < 3; ++axis) {
@@ -211,7 +211,7 @@ Scene make()
         scene.views.push_back(view);
     }
     for (const View &view : scene.views) {
-        const Vector from = centre(view.camera);
+        const Vector from = center(view.camera);
         for (uint32_t y = 7; y < view.height; y += 15) {
             for (uint32_t x = 7; x < view.width; x += 15) {
                 const Vector direction = ray(view.camera, x, y);

@@ -36,7 +36,7 @@ Scene make();
 // How far a point is from the nearest surface.
 double distance_to_surface(const Vector &point);
 
-Vector centre(const skep_camera &camera);
+Vector center(const skep_camera &camera);
 
 // The pixel a point is seen at, and its depth as third number.
 Vector project(const skep_camera &camera, const Vector &point);

@@ -27,13 +27,13 @@ void test_kernels() {
     const world::Vector at_source = world::ray(source, x, y);
     const double far = world::depth(reference, 11, 30), farther = world::depth(source, x, y);
     for (std::size_t i = 0; i < 3; ++i) {
-        const double point = world::centre(reference)[i] + far * at_reference[i];
-        CHECK(std::abs(world::centre(source)[i] + farther * at_source[i] - point) < 1e-9);
+        const double point = world::center(reference)[i] + far * at_reference[i];
+        CHECK(std::abs(world::center(source)[i] + farther * at_source[i] - point) < 1e-9);
     }
 
     const auto look = [](const std::vector<std::uint8_t> &pixels) {
         return skep_image{pixels.data(), world::width, world::height, world::width,
-                          SKEP_FORMAT_GREY};
+                          SKEP_FORMAT_GRAY};
     };
     const auto reference_picture = world::picture(reference, world::width, world::height);
     const auto source_picture = world::picture(source, world::width, world::height);

@@ -14,7 +14,7 @@ int main(int argc, char **argv) {
     test_moves();
     test_run(folder);
     test_progress();
-    test_steps_equal_whole();
+    test_stepper_equal_whole();
     test_states();
     test_kernels();
     test_files(folder);

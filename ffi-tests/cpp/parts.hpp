@@ -18,7 +18,7 @@ void test_scene();
 void test_moves();
 void test_run(const std::string &folder);
 void test_progress();
-void test_steps_equal_whole();
+void test_stepper_equal_whole();
 void test_states();
 void test_kernels();
 void test_files(const std::string &folder);

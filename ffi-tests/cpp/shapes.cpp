@@ -76,21 +76,21 @@ static void test_homographies() {
     CHECK(std::abs(plane.distance - 2) < 1e-12 && plane.normal[2] == -1);
 }
 
-/// The same picture in every type of cv::Mat gives the same correlation with itself in grey.
+/// The same picture in every type of cv::Mat gives the same correlation with itself in gray.
 static void test_pictures() {
     const auto pixels = world::picture(exact(), world::width, world::height);
-    const cv::Mat grey(world::height, world::width, CV_8U,
+    const cv::Mat gray(world::height, world::width, CV_8U,
                        const_cast<std::uint8_t *>(pixels.data()));
-    cv::Mat bgr(grey.size(), CV_8UC3), bgra(grey.size(), CV_8UC4), deep, real, wide;
-    cv::merge(std::vector<cv::Mat>{grey, grey, grey}, bgr);
-    cv::merge(std::vector<cv::Mat>{grey, grey, grey, cv::Mat::zeros(grey.size(), CV_8U)}, bgra);
-    grey.convertTo(deep, CV_16U, 257), grey.convertTo(real, CV_32F, 1 / 255.0);
-    cv::hconcat(grey, grey, wide);
+    cv::Mat bgr(gray.size(), CV_8UC3), bgra(gray.size(), CV_8UC4), deep, real, wide;
+    cv::merge(std::vector<cv::Mat>{gray, gray, gray}, bgr);
+    cv::merge(std::vector<cv::Mat>{gray, gray, gray, cv::Mat::zeros(gray.size(), CV_8U)}, bgra);
+    gray.convertTo(deep, CV_16U, 257), gray.convertTo(real, CV_32F, 1 / 255.0);
+    cv::hconcat(gray, gray, wide);
     const cv::Mat part =
         wide(cv::Rect(int(world::width), 0, int(world::width), int(world::height)));
 
     const skep::Window window = MUST(skep::Window::create(5, 2, 3, 0.1));
-    const skep::Samples reference = MUST(skep::Samples::create(grey));
+    const skep::Samples reference = MUST(skep::Samples::create(gray));
     const std::vector<skep::Pixel> pixel = {{20, 17}};
     const std::vector<skep::Homography> shift = {{1, 0, 1.25, 0, 1, 0.5, 0, 0, 1}};
     std::vector<float> expected(1), ncc(1);
@@ -101,9 +101,9 @@ static void test_pictures() {
         MUST(skep::patch_ncc(window, reference, source, pixel, shift, ncc));
         CHECK(ncc[0] == expected[0]);
     }
-    // Colours come in OpenCV's order unless told otherwise.
-    const cv::Mat coloured(9, 9, CV_8UC3, cv::Scalar(255, 0, 0));
-    CHECK(MUST(skep::image(coloured)).format == SKEP_FORMAT_BGR);
+    // Colors come in OpenCV's order unless told otherwise.
+    const cv::Mat colored(9, 9, CV_8UC3, cv::Scalar(255, 0, 0));
+    CHECK(MUST(skep::image(colored)).format == SKEP_FORMAT_BGR);
     CHECK(MUST(skep::image(bgra, skep::Order::Rgb)).format == SKEP_FORMAT_RGBA);
     CHECK(MUST(skep::image(part)).stride_bytes == 2 * world::width);
     FAILS(SKEP_ERR_ARGUMENT, "picture", skep::image(cv::Mat()));
@@ -130,15 +130,15 @@ static void test_maps(const std::string &folder) {
 
     const skep::Map<float> own_depth = MUST(result.depth(0, skep::Maps::Raw));
     const skep::Map<float> own_normal = MUST(result.normal(0, skep::Maps::Raw));
-    cv::Mat depth, normal, cost, outcome, count, bits;
+    cv::Mat depth, normal, cost, status, count, bits;
     MUST(result.depth(0, skep::Maps::Raw, depth)), MUST(result.normal(0, skep::Maps::Raw, normal));
-    MUST(result.cost(0, cost)), MUST(result.outcome(0, outcome));
+    MUST(result.cost(0, cost)), MUST(result.status(0, status));
     MUST(result.source_count(0, count)), MUST(result.source_bits(0, 0, bits));
     CHECK(depth.type() == CV_32F && normal.type() == CV_32FC3 && cost.type() == CV_32F);
-    CHECK(outcome.type() == CV_8U && count.type() == CV_16U && bits.type() == CV_32S);
+    CHECK(status.type() == CV_8U && count.type() == CV_16U && bits.type() == CV_32S);
     CHECK(depth.at<float>(20, 30) == own_depth.at(30, 20));
     CHECK(normal.at<cv::Vec3f>(20, 30)[1] == own_normal.at(30, 20, 1));
-    CHECK(outcome.at<std::uint8_t>(5, 6) == SKEP_PIXEL_MASKED && count.rows == int(world::height));
+    CHECK(status.at<std::uint8_t>(5, 6) == SKEP_PIXEL_MASKED && count.rows == int(world::height));
 
     // A part of a larger matrix stays where it is; cv::Mat_ must have the size.
     cv::Mat wide(world::height, world::width + 9, CV_32F, cv::Scalar(-1));
@@ -150,7 +150,7 @@ static void test_maps(const std::string &folder) {
     CHECK(typed(20, 30) == own_depth.at(30, 20));
     FAILS(SKEP_ERR_ARGUMENT, "3 x 3; expected 56 x 42", result.depth(0, skep::Maps::Raw, small));
 
-    // Back in: files, fusion and states take the same matrices.
+    // Back in: files, fusion and estimates take the same matrices.
     MUST(skep::write_depth_map(folder + "/depth.bin", depth));
     CHECK(MUST(skep::read_depth_map(folder + "/depth.bin")).data == own_depth.data);
     const skep::FusionView view = {MUST(scene.camera(0)),
@@ -162,10 +162,10 @@ static void test_maps(const std::string &folder) {
     const skep::Cloud cloud =
         MUST(skep::fuse(skep::Span<const skep::FusionView>(&view, 1), options));
     CHECK(MUST(cloud.size()) == std::size_t(cv::countNonZero(depth)));
-    const skep::Steps steps = MUST(skep::Steps::create(scene, options));
-    const skep::State state = MUST(steps.state_from_maps(0, 0, depth, normal, mask, cost));
-    CHECK(MUST(state.maps()).depth == own_depth.data);
-    FAILS(SKEP_ERR_ARGUMENT, "depth", steps.state_from_maps(0, 0, outcome, normal));
+    const skep::Stepper stepper = MUST(skep::Stepper::create(scene, options));
+    const skep::Estimate estimate = MUST(stepper.state_from_maps(0, 0, depth, normal, mask, cost));
+    CHECK(MUST(estimate.maps()).depth == own_depth.data);
+    FAILS(SKEP_ERR_ARGUMENT, "depth", stepper.state_from_maps(0, 0, status, normal));
 }
 
 int main(int argc, char **argv) {

@@ -11,7 +11,7 @@ skep::Scene made_scene() {
         const skep_camera camera = world::camera(place, world::width, world::height);
         const auto pixels = world::picture(camera, world::width, world::height);
         const skep_image image = {pixels.data(), world::width, world::height, world::width,
-                                  SKEP_FORMAT_GREY};
+                                  SKEP_FORMAT_GRAY};
         const std::uint32_t view = MUST(scene.add_view(image, camera));
         MUST(scene.set_depth_range(view, {2, 12}));
     }
@@ -93,7 +93,7 @@ void test_scene() {
 
 void test_moves() {
     static_assert(!std::is_copy_constructible_v<skep::Scene> &&
-                  !std::is_copy_assignable_v<skep::State>);
+                  !std::is_copy_assignable_v<skep::Estimate>);
     static_assert(std::is_nothrow_move_constructible_v<skep::Result>);
     static_assert(std::is_nothrow_move_assignable_v<skep::Cloud>);
     skep::Scene scene = made_scene();
@@ -153,14 +153,14 @@ void test_run(const std::string &folder) {
     CHECK(normal.channels == 3 && MUST(result.borrow_normal(0)).at(9, 9, 2) == normal.at(9, 9, 2));
     CHECK(normal.at(28, 21, 2) * wall[2] > 0.7);
     CHECK(MUST(result.cost(0)).at(28, 21) == MUST(result.borrow_cost(0)).at(28, 21));
-    const skep::Map<std::uint8_t> outcome = MUST(result.outcome(0));
-    CHECK(outcome.at(28, 21) == MUST(result.borrow_outcome(0)).at(28, 21));
+    const skep::Map<std::uint8_t> status = MUST(result.status(0));
+    CHECK(status.at(28, 21) == MUST(result.borrow_status(0)).at(28, 21));
 
     const skep_statistics statistics = MUST(result.statistics(0));
     std::uint64_t validated = 0;
-    for (std::uint8_t value : outcome.data)
+    for (std::uint8_t value : status.data)
         validated += value == SKEP_PIXEL_VALIDATED;
-    CHECK(statistics.pixels[SKEP_PIXEL_VALIDATED] == validated && statistics.ncc_evaluations > 0);
+    CHECK(statistics.status_counts[SKEP_PIXEL_VALIDATED] == validated && statistics.ncc_evaluations > 0);
     CHECK(MUST(result.cycles(0)).size() == 6 && MUST(result.sources(0)).size() == 4);
     std::uint32_t bits = MUST(result.source_bits(0, 0)).at(28, 21);
     int count = 0;
@@ -172,7 +172,7 @@ void test_run(const std::string &folder) {
     const skep::Points points = MUST(cloud.points());
     const skep::ViewLists lists = MUST(cloud.views());
     const std::size_t size = MUST(cloud.size());
-    CHECK(size > 500 && points.normals.size() == 3 * size && points.colours.size() == 3 * size);
+    CHECK(size > 500 && points.normals.size() == 3 * size && points.colors.size() == 3 * size);
     std::size_t total = 0, near_wall = 0;
     for (std::uint32_t of_point : lists.counts)
         total += of_point;

@@ -23,8 +23,8 @@ inline Vector wall_normal() {
     return {0.2 / length, 0.1 / length, -1.0 / length};
 }
 
-/// Grey of the wall at a point, 0 to 255.
-inline double grey(const Vector &p) {
+/// Gray of the wall at a point, 0 to 255.
+inline double gray(const Vector &p) {
     const double coarse = std::sin(7 * p[0] + 3 * p[1]) + std::sin(5 * p[1] - 3 * p[0] + 1);
     const double fine = std::sin(19 * p[0] - 11 * p[1] + 2) + std::sin(17 * p[1] + 13 * p[0]);
     return 127 + 32 * coarse + 24 * fine;
@@ -46,8 +46,8 @@ inline skep_camera camera(double x, std::uint32_t width, std::uint32_t height) {
     return camera;
 }
 
-/// The centre of a camera, -R^T t.
-inline Vector centre(const skep_camera &camera) {
+/// The center of a camera, -R^T t.
+inline Vector center(const skep_camera &camera) {
     Vector out = {};
     for (std::size_t i = 0; i < 9; ++i)
         out[i % 3] -= camera.rotation[i] * camera.translation[i / 3];
@@ -65,7 +65,7 @@ inline Vector ray(const skep_camera &camera, double x, double y) {
 
 /// Depth of the wall at a pixel.
 inline double depth(const skep_camera &camera, double x, double y) {
-    const Vector from = centre(camera), normal = wall_normal();
+    const Vector from = center(camera), normal = wall_normal();
     return dot(normal, {-from[0], -from[1], 5 - from[2]}) / dot(normal, ray(camera, x, y));
 }
 
@@ -81,7 +81,7 @@ inline Vector normal(const skep_camera &camera) {
 /// What a camera sees, 8 bits a pixel.
 inline std::vector<std::uint8_t> picture(const skep_camera &camera, std::uint32_t width,
                                          std::uint32_t height) {
-    const Vector from = centre(camera);
+    const Vector from = center(camera);
     std::vector<std::uint8_t> out;
     out.reserve(std::size_t(width) * height);
     for (std::uint32_t y = 0; y < height; ++y) {
@@ -91,7 +91,7 @@ inline std::vector<std::uint8_t> picture(const skep_camera &camera, std::uint32_
             Vector point = {};
             for (std::size_t i = 0; i < 3; ++i)
                 point[i] = from[i] + far * along[i];
-            out.push_back(std::uint8_t(std::lround(grey(point))));
+            out.push_back(std::uint8_t(std::lround(gray(point))));
         }
     }
     return out;

@@ -11,7 +11,7 @@ skep_status use_macros(
     skep_image *image, uint32_t step, const skep_statistics *statistics, skep_status before)
 {
     image->format = SKEP_FORMAT_BGR + SKEP_FORMAT_16;
-    if (step == SKEP_STEP_NONE || statistics->pixels[SKEP_PIXEL_MASKED] > 0) {
+    if (step == SKEP_CYCLE_NONE || statistics->status_counts[SKEP_PIXEL_MASKED] > 0) {
         return SKEP_OK;
     }
     switch (before) {
@@ -19,6 +19,6 @@ skep_status use_macros(
     case SKEP_ERR_PANIC:
         return 0 - SKEP_ERR_NULL;
     default:
-        return skep_abi_version() == SKEP_ABI_VERSION ? SKEP_OK : SKEP_ERR_STATE;
+        return skep_abi_version() == SKEP_ABI_VERSION ? SKEP_OK : SKEP_ERR_POISONED;
     }
 }

@@ -85,7 +85,7 @@ static void test_against_warp() {
     cv::warpPerspective(seen, warped, matrix, {width, height},
                         cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
 
-    // The exact warp by H may differ by the rounding of places and, half a grey, of the result;
+    // The exact warp by H may differ by the rounding of places and, half a gray, of the result;
     // weights have 15 bits.
     double most = 0, from_exact = 0, from_truth = 0, unwarped = 0;
     int inside = 0;
@@ -93,17 +93,17 @@ static void test_against_warp() {
         for (int x = 0; x < width; ++x) {
             const cv::Point2d at = apply(h, x, y);
             if (at.x < 1 || at.y < 1 || at.x > width - 2 || at.y > height - 2) continue;
-            const int grey = warped.at<std::uint8_t>(y, x),
+            const int gray = warped.at<std::uint8_t>(y, x),
                       truth = reference_pixels[std::size_t(y * width + x)];
-            const double difference = std::abs(grey - sample(seen, at));
+            const double difference = std::abs(gray - sample(seen, at));
             CHECK(difference <= rounding_bound(seen, at) + 0.51);
             most = std::max(most, difference), from_exact += difference;
-            from_truth += std::abs(grey - truth);
+            from_truth += std::abs(gray - truth);
             unwarped += std::abs(seen.at<std::uint8_t>(y, x) - truth);
             ++inside;
         }
     }
-    std::printf("warps: from the exact warp %.3f greys in the mean, %.2f at most; from what the "
+    std::printf("warps: from the exact warp %.3f grays in the mean, %.2f at most; from what the "
                 "camera sees %.2f, "
                 "without warping %.2f (%d pixels)\n",
                 from_exact / inside, most, from_truth / inside, unwarped / inside, inside);

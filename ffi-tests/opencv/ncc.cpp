@@ -33,7 +33,7 @@ static Differences compare(const cv::Mat &reference, const cv::Mat &source, int 
     const int side = 2 * radius / step + 1;
     cv::Mat real_source, patch(side, side, CV_32F), map_x = patch.clone(), map_y = patch.clone(),
                                                     seen, result;
-    source.convertTo(real_source, CV_32F); // so that results are not rounded to whole greys
+    source.convertTo(real_source, CV_32F); // so that results are not rounded to whole grays
     Differences out;
     for (std::size_t i = 0; i < pixels.size(); ++i) {
         cv::Mat exact(side, side, CV_64F), error(side, side, CV_64F), own(side, side, CV_64F);

@@ -9,7 +9,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-/// Smoothed noise that uses most of the greys, 8 bits a pixel.
+/// Smoothed noise that uses most of the grays, 8 bits a pixel.
 inline cv::Mat texture(int width, int height, double smoothness, std::uint64_t seed) {
     cv::Mat noise(height, width, CV_32F), out;
     cv::RNG random(seed);
@@ -48,11 +48,11 @@ inline double rounding_bound(const cv::Mat &picture, cv::Point2d at) {
     int across = 0, down = 0;
     for (int y = top; y <= bottom; ++y) {
         for (int x = left; x <= right; ++x) {
-            const int grey = picture.at<std::uint8_t>(y, x);
+            const int gray = picture.at<std::uint8_t>(y, x);
             if (x < right)
-                across = std::max(across, std::abs(picture.at<std::uint8_t>(y, x + 1) - grey));
+                across = std::max(across, std::abs(picture.at<std::uint8_t>(y, x + 1) - gray));
             if (y < bottom)
-                down = std::max(down, std::abs(picture.at<std::uint8_t>(y + 1, x) - grey));
+                down = std::max(down, std::abs(picture.at<std::uint8_t>(y + 1, x) - gray));
         }
     }
     return (across + down) / 64.0;

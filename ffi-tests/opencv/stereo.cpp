@@ -11,9 +11,9 @@ static constexpr double focal = 260, baseline = 0.2, cx = 143.5, cy = 107.5;
 static std::uint32_t seed = 0;
 static const double infinity = std::numeric_limits<double>::infinity();
 
-/// Grey of a surface at a place on it: random numbers at the corners of grids of several widths,
+/// Gray of a surface at a place on it: random numbers at the corners of grids of several widths,
 /// blended.
-static double grey(double u, double v, int surface) {
+static double gray(double u, double v, int surface) {
     double sum = 0;
     for (int octave = 0; octave < 4; ++octave) {
         const double x = u * (6 << octave) + 100, y = v * (6 << octave) + 100;
@@ -34,7 +34,7 @@ static double grey(double u, double v, int surface) {
 }
 
 struct Hit {
-    double depth = infinity, grey = 0;
+    double depth = infinity, gray = 0;
 };
 
 /// What a ray meets first, from (x, 0, 0) towards (a, b, 1): a back wall, a floor, a slanted board
@@ -45,15 +45,15 @@ static Hit look(double x, double a, double b) {
         const double depth = (offset - normal[0] * x) / (normal[0] * a + normal[1] * b + normal[2]);
         const double u = x + depth * a, v = depth * b;
         if (depth > 0.5 && depth < hit.depth && inside(u, v))
-            hit = {depth, grey(u, std::abs(normal[1]) > 0.5 ? depth : v, surface)};
+            hit = {depth, gray(u, std::abs(normal[1]) > 0.5 ? depth : v, surface)};
     };
-    const auto ball = [&](int surface, cv::Vec3d centre, double radius) {
-        const cv::Vec3d ray(a, b, 1), from(x - centre[0], -centre[1], -centre[2]);
+    const auto ball = [&](int surface, cv::Vec3d center, double radius) {
+        const cv::Vec3d ray(a, b, 1), from(x - center[0], -center[1], -center[2]);
         const double half = ray.dot(from) / ray.dot(ray);
         const double root = half * half - (from.dot(from) - radius * radius) / ray.dot(ray);
         if (root < 0 || -half - std::sqrt(root) >= hit.depth) return;
         const double depth = -half - std::sqrt(root);
-        hit = {depth, grey(from[0] + depth * a, from[1] + depth * b, surface)};
+        hit = {depth, gray(from[0] + depth * a, from[1] + depth * b, surface)};
     };
     const auto everywhere = [](double, double) { return true; };
     plane(0, {0.25, 0.05, 1}, 4.5, everywhere);
@@ -73,7 +73,7 @@ static cv::Mat photograph(double x, std::uint64_t number) {
             double sum = 0;
             for (double dy : {-0.25, 0.25})
                 for (double dx : {-0.25, 0.25})
-                    sum += look(x, (column + dx - cx) / focal, (row + dy - cy) / focal).grey;
+                    sum += look(x, (column + dx - cx) / focal, (row + dy - cy) / focal).gray;
             out.at<float>(row, column) = float(sum / 4);
         }
     }
@@ -147,8 +147,8 @@ static std::array<cv::Mat, 2> our_disparities(const cv::Mat &left, const cv::Mat
     // lie beyond them.
     options.set("window_radius", 3);
     options.set("window_step", 1);
-    options.set("spatial_sigma", 1.5);
-    options.set("colour_sigma", 0.08);
+    options.set("sigma_spatial", 1.5);
+    options.set("sigma_color", 0.08);
     const skep::Result result = skep::reconstruct(scene, options);
     std::array<cv::Mat, 2> out;
     for (std::size_t i = 0; i < 2; ++i) {

@@ -13,7 +13,7 @@ static void make(const std::string &folder) {
         const skep_camera camera = world::camera(place, world::width, world::height);
         const auto pixels = world::picture(camera, world::width, world::height);
         scene.add_view(
-            skep_image{pixels.data(), world::width, world::height, world::width, SKEP_FORMAT_GREY},
+            skep_image{pixels.data(), world::width, world::height, world::width, SKEP_FORMAT_GRAY},
             camera);
     }
     // Points of the wall, which all cameras saw: the example takes its depth ranges from them.
@@ -41,11 +41,11 @@ static void check(const std::string &cloud, const std::string &picture) {
     while (std::getline(ply, line) && line != "end_header")
         if (line.rfind("element vertex ", 0) == 0) points = line.substr(15);
     CHECK(line == "end_header" && std::stoi(points) > 500);
-    const cv::Mat colours = cv::imread(picture);
-    CHECK(colours.cols == int(world::width) && colours.rows == int(world::height));
+    const cv::Mat colors = cv::imread(picture);
+    CHECK(colors.cols == int(world::width) && colors.rows == int(world::height));
     cv::Scalar mean, deviation;
-    cv::meanStdDev(colours, mean, deviation);
-    CHECK(deviation[0] + deviation[1] + deviation[2] > 50); // a colour map, not a blank
+    cv::meanStdDev(colors, mean, deviation);
+    CHECK(deviation[0] + deviation[1] + deviation[2] > 50); // a color map, not a blank
 }
 
 int main(int argc, char **argv) {

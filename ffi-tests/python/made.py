@@ -28,13 +28,13 @@ class Photograph:
 
 def camera_at(x: float, y: float) -> skep.Camera:
     """A camera that looks at the world's origin."""
-    centre = np.array([x, y, -DISTANCE])
-    forward = -centre / np.linalg.norm(centre)
+    center = np.array([x, y, -DISTANCE])
+    forward = -center / np.linalg.norm(center)
     right = np.cross([0.0, 1.0, 0.0], forward)
     right /= np.linalg.norm(right)
     R = np.array([right, np.cross(forward, right), forward])
     K = [[FOCAL, 0, WIDTH / 2 - 0.7], [0, FOCAL * 1.01, HEIGHT / 2 + 0.4], [0, 0, 1]]
-    return skep.Camera(K, R, -R @ centre)
+    return skep.Camera(K, R, -R @ center)
 
 
 def rays(camera: skep.Camera, columns: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -46,7 +46,7 @@ def rays(camera: skep.Camera, columns: np.ndarray, rows: np.ndarray) -> np.ndarr
 
 def cast(camera: skep.Camera, columns: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Depth, position and normal in the world of what is seen through pixels."""
-    origin, direction = camera.centre, rays(camera, columns, rows)
+    origin, direction = camera.center, rays(camera, columns, rows)
     wall = (-WALL_DISTANCE - origin @ WALL) / (direction @ WALL)
     towards = origin - BALL
     a, b = (direction**2).sum(-1), direction @ towards
@@ -60,7 +60,7 @@ def cast(camera: skep.Camera, columns: np.ndarray, rows: np.ndarray) -> tuple[np
 
 def texture(position: np.ndarray) -> np.ndarray:
     """Several octaves of noise over the world's positions, 0 to 1."""
-    colour = np.zeros(position.shape)
+    color = np.zeros(position.shape)
     for cell, share in ((0.5, 0.3), (0.22, 0.3), (0.1, 0.4)):
         place = position / cell + 100
         corner = np.floor(place).astype(int)
@@ -68,8 +68,8 @@ def texture(position: np.ndarray) -> np.ndarray:
         for x, y, z in np.ndindex(2, 2, 2):
             weight = np.abs([1 - x, 1 - y, 1 - z] - part).prod(-1)
             at = (corner + [x, y, z]) % 32
-            colour += share * weight[..., None] * NOISE[at[..., 0], at[..., 1], at[..., 2]]
-    return np.clip(2 * colour - 0.5, 0, 1)
+            color += share * weight[..., None] * NOISE[at[..., 0], at[..., 1], at[..., 2]]
+    return np.clip(2 * color - 0.5, 0, 1)
 
 
 @cache
@@ -80,8 +80,8 @@ def photographs() -> tuple[Photograph, ...]:
         camera = camera_at(*place)
         depth, _, normal = cast(camera, columns, rows)
         parts = [(x, y) for x in (-0.25, 0.25) for y in (-0.25, 0.25)]
-        colour = np.mean([texture(cast(camera, columns + x, rows + y)[1]) for x, y in parts], axis=0)
-        found.append(Photograph(camera, np.round(255 * colour).astype(np.uint8), depth, normal @ camera.R.T))
+        color = np.mean([texture(cast(camera, columns + x, rows + y)[1]) for x, y in parts], axis=0)
+        found.append(Photograph(camera, np.round(255 * color).astype(np.uint8), depth, normal @ camera.R.T))
     return tuple(found)
 
 

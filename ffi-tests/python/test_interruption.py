@@ -24,7 +24,7 @@ def test_progress_comes_in_the_callers_thread_and_grows(scene):
     assert threads == {threading.get_ident()}
     done = [progress.done for progress in told]
     assert done == sorted(done) and 0 <= done[0] and done[-1] <= 1
-    assert {progress.reduction for progress in told} <= {1, 2}
+    assert {progress.downscale for progress in told} <= {1, 2}
     assert all(isinstance(progress.phase, skep.Phase) for progress in told)
     assert all(progress.view < progress.view_count == len(scene) for progress in told)
 
@@ -47,9 +47,9 @@ def test_an_exception_cancels_and_is_raised(scene):
 
 
 def test_a_step_can_be_cancelled(scene):
-    steps = skep.Steps(scene, made.slow_options())
+    stepper = skep.Stepper(scene, made.slow_options())
     with pytest.raises(skep.Cancelled):
-        steps.search(0, 0, progress=lambda progress: True)
+        stepper.search(0, 0, progress=lambda progress: True)
 
 
 INTERRUPTED = """

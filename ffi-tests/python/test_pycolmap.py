@@ -25,7 +25,7 @@ def folder(pycolmap, tmp_path_factory):
     found = made.photographs()
     positions, views = made.points()
     fx, fy, (cx, cy) = found[0].camera.K[0, 0], found[0].camera.K[1, 1], found[0].camera.K[:2, 2]
-    # COLMAP has the centre of the top-left pixel at (0.5, 0.5).
+    # COLMAP has the center of the top-left pixel at (0.5, 0.5).
     parameters = [fx, fy, cx + 0.5, cy + 0.5]
     reconstruction.add_camera_with_trivial_rig(
         pycolmap.Camera(camera_id=1, model="PINHOLE", width=made.WIDTH, height=made.HEIGHT, params=parameters)
@@ -86,7 +86,7 @@ def test_pycolmap_fuses_our_workspace(pycolmap, reconstruction, folder, tmp_path
     scene.write_colmap(workspace)
     result.write_workspace(scene, workspace)
     (tmp_path / "fused").mkdir()
-    # Our tolerances. Within 2 pixels, its default, it would merge neighbouring pixels of images as small as these.
+    # Our tolerances. Within 2 pixels, its default, it would merge neighboring pixels of images as small as these.
     options = pycolmap.StereoFusionOptions(
         min_num_pixels=3, max_reproj_error=0.5, max_depth_error=0.01, max_normal_error=30, num_threads=2
     )

@@ -19,4 +19,4 @@ def test_the_readme_s_program_gives_depths_and_points() -> None:
     truth = taken[0].depth
     assert validated.mean() > 0.5
     assert np.median(np.abs(names["depth"] / truth - 1)[validated]) < 0.005
-    assert len(names["positions"]) == len(names["colours"]) > 1000
+    assert len(names["positions"]) == len(names["colors"]) > 1000

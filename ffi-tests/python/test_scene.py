@@ -6,7 +6,7 @@ import pytest
 import skep
 from skep import _images
 
-GREY = np.zeros((6, 8), dtype=np.uint8)
+GRAY = np.zeros((6, 8), dtype=np.uint8)
 CAMERA = skep.Camera([[10, 0, 4], [0, 10, 3], [0, 0, 1]])
 
 
@@ -17,15 +17,15 @@ def test_a_scene_tells_what_it_was_given():
         assert scene.add_view(photograph.image, photograph.camera, name=f"ü{number}.png") == number
     assert len(scene) == len(truth) and scene.name(1) == "ü1.png" and scene.size(1) == (made.WIDTH, made.HEIGHT)
     camera = scene.camera(2)
-    for name in ("K", "R", "t", "centre"):
+    for name in ("K", "R", "t", "center"):
         np.testing.assert_allclose(getattr(camera, name), getattr(truth[2].camera, name), rtol=1e-12)
     positions, views = made.points()
     scene.add_points(positions, views)
     near, far = scene.depth_range(0)
     assert near < truth[0].depth.min() and truth[0].depth.max() < far
     assert set(scene.sources(0)) <= set(scene.overlap(0)) == set(range(1, len(truth)))
-    cosine = scene.camera(0).centre @ scene.camera(1).centre
-    cosine /= np.linalg.norm(scene.camera(0).centre) * np.linalg.norm(scene.camera(1).centre)
+    cosine = scene.camera(0).center @ scene.camera(1).center
+    cosine /= np.linalg.norm(scene.camera(0).center) * np.linalg.norm(scene.camera(1).center)
     assert abs(scene.triangulation_angle(0, 1) - np.degrees(np.arccos(cosine))) < 3
     scene.set_sources(0, [3, 1])
     scene.set_depth_range(0, (1.5, 9.0))
@@ -43,7 +43,7 @@ def test_masked_pixels_have_no_depth_and_say_why():
     scene.set_mask(0, mask)
     options = skep.Options(scales=[(0, 3, 1, 1, 1)])
     masked = skep.reconstruct(scene, options)[0]
-    assert np.array_equal(masked.outcome == skep.Outcome.MASKED, ~mask)
+    assert np.array_equal(masked.status == skep.PixelStatus.MASKED, ~mask)
     assert not masked.depth[~mask].any() and masked.depth[mask].all()
     scene.set_mask(0, None)
     assert skep.reconstruct(scene, options)[0].depth.all()
@@ -60,19 +60,19 @@ def test_a_view_that_is_refused_is_not_added():
         ({"name": "a\0b"}, "NUL"),
     ]:
         with pytest.raises(skep.ArgumentError, match=words):
-            scene.add_view(GREY, CAMERA, **arguments)
-    for image in (GREY[:0], GREY[0], np.zeros((6, 8, 2), np.uint8), GREY.astype(float), GREY.astype(bool)):
+            scene.add_view(GRAY, CAMERA, **arguments)
+    for image in (GRAY[:0], GRAY[0], np.zeros((6, 8, 2), np.uint8), GRAY.astype(float), GRAY.astype(bool)):
         with pytest.raises(skep.ArgumentError, match="image has"):
             scene.add_view(image, CAMERA)
     assert len(scene) == 0
-    assert scene.add_view(GREY, CAMERA, mask=GREY == 0, depth_range=(1.0, 2.0)) == 0
+    assert scene.add_view(GRAY, CAMERA, mask=GRAY == 0, depth_range=(1.0, 2.0)) == 0
     assert scene.name(0) == "view0000.png"
 
 
 def test_rows_without_gaps_are_read_where_they_are():
     large = np.zeros((40, 50, 3), dtype=np.uint8)
-    deep, grey = large.astype(np.uint16), large[:, :, 0].copy()
-    for there in (large, large[3:9, 4:20], large[::2, 10:], large[:1], deep[5:, 5:], grey):
+    deep, gray = large.astype(np.uint16), large[:, :, 0].copy()
+    for there in (large, large[3:9, 4:20], large[::2, 10:], large[:1], deep[5:, 5:], gray):
         assert _images.image(there, "rgb").array.ctypes.data == there.ctypes.data
     for elsewhere in (large[::-1], large[:, ::2], large[:, :, 0], large.transpose(1, 0, 2), large.astype(">u2")):
         given = _images.image(elsewhere, "rgb")
@@ -112,7 +112,7 @@ def test_cameras_are_checked():
             skep.Camera(K)
     for R, words in ((np.diag([1, 1, -1]), "rotation"), (2 * np.eye(3), "rotation")):
         with pytest.raises(skep.ArgumentError, match=words):
-            skep.Scene().add_view(GREY, skep.Camera(CAMERA.K, R))
+            skep.Scene().add_view(GRAY, skep.Camera(CAMERA.K, R))
     assert skep.Camera(CAMERA.K, t=[[1], [2], [3]]).t.tolist() == [1, 2, 3]
     assert not CAMERA.K.flags.writeable and "K=[[10.0" in repr(CAMERA)
 

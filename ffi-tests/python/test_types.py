@@ -29,9 +29,9 @@ def progress(progress: skep.Progress) -> bool:
 
 result = skep.reconstruct(scene, options, progress)
 assert_type(result[0].depth, NDArray[np.float32])
-assert_type(result[0].statistics.pixels[skep.Outcome.MASKED], int)
+assert_type(result[0].statistics.status_counts[skep.PixelStatus.MASKED], int)
 assert_type(result.cloud.positions, NDArray[np.float64])
-state: skep.State = skep.Steps(scene).search(0, 0)
+estimate: skep.Estimate = skep.Stepper(scene).search(0, 0)
 scene.add_view(image, skep.Camera(np.eye(3)), order="gbr")  # wrong
 scene.set_mask("0", None)  # wrong
 skep.Options("best")  # wrong

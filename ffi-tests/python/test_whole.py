@@ -6,7 +6,7 @@ import made
 import numpy as np
 import pytest
 import skep
-from skep import Outcome
+from skep import PixelStatus
 
 
 def test_validated_depths_and_normals_are_those_of_the_world(result):
@@ -24,18 +24,18 @@ def test_validated_depths_and_normals_are_those_of_the_world(result):
 def test_maps_fit_each_other(result):
     assert len(result) == len(made.PLACES) and [view.view for view in result] == list(range(len(result)))
     for view in result:
-        validated = view.outcome == Outcome.VALIDATED
+        validated = view.status == PixelStatus.VALIDATED
         assert view.size == (made.WIDTH, made.HEIGHT)
-        assert view.depth.shape == view.cost.shape == view.outcome.shape == (made.HEIGHT, made.WIDTH)
+        assert view.depth.shape == view.cost.shape == view.status.shape == (made.HEIGHT, made.WIDTH)
         assert view.depth.dtype == view.normal.dtype == view.cost.dtype == np.float32
         assert np.array_equal(view.validated_depth, np.where(validated, view.depth, 0))
         assert np.array_equal(view.validated_normal, np.where(validated[..., None], view.normal, 0))
         assert view.cost.min() >= 0 and view.cost.max() <= 2
-        for outcome in Outcome:
-            assert view.statistics.pixels[outcome] == (view.outcome == outcome).sum()
-        assert sum(view.statistics.pixels.values()) == view.depth.size
+        for status in PixelStatus:
+            assert view.statistics.status_counts[status] == (view.status == status).sum()
+        assert sum(view.statistics.status_counts.values()) == view.depth.size
         assert view.statistics.ncc_evaluations > view.depth.size
-        assert view.cycles[0].reduction == 2 and view.cycles[-1].reduction == 1
+        assert view.cycles[0].downscale == 2 and view.cycles[-1].downscale == 1
         assert view.cycles[-1].pixels == view.depth.size
 
 
@@ -50,7 +50,7 @@ def test_source_counts_are_those_of_the_source_sets(result, scene):
 
 def test_raw_maps_are_the_memory_of_the_result(result):
     view = result[1]
-    for name in ("depth", "normal", "cost", "outcome"):
+    for name in ("depth", "normal", "cost", "status"):
         array = getattr(view, name)
         again = getattr(skep.ResultView(result._handle, 1), name)
         assert not array.flags.owndata and not array.flags.writeable and array.flags.c_contiguous
@@ -104,15 +104,15 @@ def test_bits_do_not_depend_on_threads_instruction_set_or_array_layout():
 def test_the_cloud_lies_on_the_surfaces(result):
     cloud = result.cloud
     assert len(cloud) > 3000
-    assert cloud.positions.shape == cloud.normals.shape == cloud.colours.shape == (len(cloud), 3)
-    assert (cloud.positions.dtype, cloud.normals.dtype, cloud.colours.dtype) == (np.float64, np.float32, np.uint8)
+    assert cloud.positions.shape == cloud.normals.shape == cloud.colors.shape == (len(cloud), 3)
+    assert (cloud.positions.dtype, cloud.normals.dtype, cloud.colors.dtype) == (np.float64, np.float32, np.uint8)
     wall = np.abs(cloud.positions @ made.WALL + made.WALL_DISTANCE)
     ball = np.abs(np.linalg.norm(cloud.positions - made.BALL, axis=1) - made.RADIUS)
     assert np.median(np.minimum(wall, ball)) < 0.01
     assert cloud.view_counts.sum() == cloud.views.size and cloud.view_counts.min() >= 3
     assert cloud.views.max() < len(result)
-    colours = made.texture(cloud.positions) * 255
-    assert np.median(np.abs(colours - cloud.colours)) < 25
+    colors = made.texture(cloud.positions) * 255
+    assert np.median(np.abs(colors - cloud.colors)) < 25
 
 
 def test_fusion_of_a_runs_validated_maps_gives_its_cloud(result, scene):
@@ -125,10 +125,10 @@ def test_fusion_of_a_runs_validated_maps_gives_its_cloud(result, scene):
     cloud = skep.fuse(views, made.options())
     assert np.array_equal(cloud.positions, result.cloud.positions)
     assert np.array_equal(cloud.normals, result.cloud.normals)
-    assert np.array_equal(cloud.colours, result.cloud.colours)
+    assert np.array_equal(cloud.colors, result.cloud.colors)
     assert np.array_equal(cloud.views, result.cloud.views)
-    grey = skep.fuse([skep.FusionView(view.camera, view.depth, view.normal) for view in views], made.options())
-    assert len(grey) == len(cloud) and (grey.colours == 128).all()
+    gray = skep.fuse([skep.FusionView(view.camera, view.depth, view.normal) for view in views], made.options())
+    assert len(gray) == len(cloud) and (gray.colors == 128).all()
 
 
 def test_fusion_names_what_is_wrong(result):
@@ -149,4 +149,4 @@ def test_a_run_warns_of_views_without_enough_sources():
     found = skep.reconstruct(scene, quick())
     assert len(found.warnings) > 0 and all("source" in warning for warning in found.warnings)
     assert len(found.cloud) == 0 and found.cloud.positions.shape == (0, 3) and found.cloud.views.shape == (0,)
-    assert (found[0].outcome == Outcome.NO_SOURCES).any()
+    assert (found[0].status == PixelStatus.NO_SOURCES).any()

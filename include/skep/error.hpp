@@ -85,47 +85,47 @@ template <class T> using Fallible = T;
 
 namespace detail {
 /// What a call came to, before it is told to the user.
-struct Outcome {
+struct Status {
     skep_status status = SKEP_OK;
     std::string text;
 
-    Outcome() = default;
-    Outcome(skep_status of_call) : status(of_call) {
+    Status() = default;
+    Status(skep_status of_call) : status(of_call) {
         if (status == SKEP_OK) return;
         text.resize(skep_last_error(nullptr, 0));
         skep_last_error(text.data(), text.size());
         if (!text.empty()) text.pop_back(); // the NUL
     }
     /// Something this header finds, in the words of the library.
-    static Outcome argument(const std::string &name, const std::string &value,
+    static Status argument(const std::string &name, const std::string &value,
                             const std::string &expected) {
-        Outcome outcome;
-        outcome.status = SKEP_ERR_ARGUMENT;
-        outcome.text = name + " is " + value + "; expected " + expected;
-        return outcome;
+        Status status;
+        status.status = SKEP_ERR_ARGUMENT;
+        status.text = name + " is " + value + "; expected " + expected;
+        return status;
     }
     explicit operator bool() const noexcept { return status == SKEP_OK; }
     /// Goes on with `next` if nothing failed so far.
-    template <class Next> Outcome then(Next next) && {
-        return *this ? Outcome(next()) : std::move(*this);
+    template <class Next> Status then(Next next) && {
+        return *this ? Status(next()) : std::move(*this);
     }
 };
 
 #ifdef SKEP_NO_EXCEPTIONS
-template <class T> Fallible<T> give(Outcome outcome, T &value) {
-    if (!outcome) return Error(outcome.status, std::move(outcome.text));
+template <class T> Fallible<T> give(Status status, T &value) {
+    if (!status) return Error(status.status, std::move(status.text));
     return std::move(value);
 }
-inline Fallible<void> give(Outcome outcome) {
-    if (!outcome) return Error(outcome.status, std::move(outcome.text));
+inline Fallible<void> give(Status status) {
+    if (!status) return Error(status.status, std::move(status.text));
     return {};
 }
 #else
-inline void give(Outcome outcome) {
-    if (!outcome) throw Error(outcome.status, std::move(outcome.text));
+inline void give(Status status) {
+    if (!status) throw Error(status.status, std::move(status.text));
 }
-template <class T> T give(Outcome outcome, T &value) {
-    give(std::move(outcome));
+template <class T> T give(Status status, T &value) {
+    give(std::move(status));
     return std::move(value);
 }
 #endif
@@ -135,17 +135,17 @@ template <class T> T give(Outcome outcome, T &value) {
 template <class T, class Call> Fallible<std::vector<T>> list(Call call) {
     std::vector<T> items;
     std::size_t count = 0;
-    Outcome outcome = call(nullptr, 0, &count);
-    if (outcome) {
+    Status status = call(nullptr, 0, &count);
+    if (status) {
         items.resize(count);
-        outcome = call(items.data(), items.size(), &count);
+        status = call(items.data(), items.size(), &count);
     }
-    return give(std::move(outcome), items);
+    return give(std::move(status), items);
 }
 /// A text of the C interface, likewise.
-template <class Call> Outcome text(std::string &out, Call call) {
+template <class Call> Status text(std::string &out, Call call) {
     std::size_t needed = 0;
-    return Outcome(call(nullptr, 0, &needed)).then([&] {
+    return Status(call(nullptr, 0, &needed)).then([&] {
         out.resize(needed);
         const skep_status status = call(out.data(), out.size(), &needed);
         if (status == SKEP_OK && !out.empty()) out.pop_back(); // the NUL

@@ -36,7 +36,7 @@ inline Fallible<void> write_consistency_graph(const std::string &file,
     const auto &[counts, views] = graph.lists;
     if (counts.size() != std::size_t(graph.size.width) * graph.size.height)
         return detail::give(
-            detail::Outcome::argument("counts", std::to_string(counts.size()) + " long",
+            detail::Status::argument("counts", std::to_string(counts.size()) + " long",
                                       detail::by(graph.size.width, graph.size.height)));
     return detail::give(skep_write_consistency_graph(file.c_str(), graph.size.width,
                                                      graph.size.height, counts.data(), views.data(),
@@ -48,11 +48,11 @@ template <class Call>
 Fallible<Map<float>> read_map(Call call, const std::string &file, std::uint32_t channels) {
     Map<float> map;
     Size size;
-    Outcome outcome = Outcome(call(file.c_str(), nullptr, 0, &size.width, &size.height)).then([&] {
+    Status status = Status(call(file.c_str(), nullptr, 0, &size.width, &size.height)).then([&] {
         map = Map<float>(size, channels);
         return call(file.c_str(), map.data.data(), map.data.size(), &size.width, &size.height);
     });
-    return give(std::move(outcome), map);
+    return give(std::move(status), map);
 }
 } // namespace detail
 
@@ -74,11 +74,11 @@ inline Fallible<ConsistencyGraph> read_consistency_graph(const std::string &file
             lists.views.empty() ? nullptr : lists.views.data(), lists.views.size(), &size.width,
             &size.height, &total);
     };
-    detail::Outcome outcome = detail::Outcome(call()).then([&, &size = size, &lists = lists] {
+    detail::Status status = detail::Status(call()).then([&, &size = size, &lists = lists] {
         lists.counts.resize(std::size_t(size.width) * size.height), lists.views.resize(total);
         return call();
     });
-    return detail::give(std::move(outcome), graph);
+    return detail::give(std::move(status), graph);
 }
 
 } // namespace SKEP_FLAVOUR

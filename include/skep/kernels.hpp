@@ -18,8 +18,8 @@ static_assert(sizeof(Homography) == 72 && sizeof(Pixel) == 8,
 /// A homography from a matrix of Eigen or OpenCV.
 template <class M> Fallible<Homography> homography(const M &matrix) {
     Homography out = {};
-    detail::Outcome outcome = detail::read(matrix, 3, 3, "homography", out.data());
-    return detail::give(std::move(outcome), out);
+    detail::Status status = detail::read(matrix, 3, 3, "homography", out.data());
+    return detail::give(std::move(status), out);
 }
 
 /// Writes a homography into a matrix of Eigen or OpenCV; a cv::Mat becomes one of doubles.
@@ -43,10 +43,10 @@ Fallible<skep_plane> plane_through(const skep_camera &camera, double x, double y
                                    const Normal &normal) {
     skep_plane plane = {};
     double unit[3] = {};
-    detail::Outcome outcome = detail::read_vector(normal, "normal", unit).then([&] {
+    detail::Status status = detail::read_vector(normal, "normal", unit).then([&] {
         return skep_plane_through(&camera, x, y, depth, unit, &plane);
     });
-    return detail::give(std::move(outcome), plane);
+    return detail::give(std::move(status), plane);
 }
 
 /// The homographies that planes induce from pixels of one camera to pixels of another.
@@ -59,28 +59,28 @@ inline Fallible<std::vector<Homography>> plane_homographies(const skep_camera &r
                         out);
 }
 
-/// A grey image in the layout the kernels sample.
-class Samples : public detail::Handle<skep_samples, skep_samples_destroy> {
+/// A gray image in the layout the kernels sample.
+class Samples : public detail::Handle<skep_packed_image, skep_packed_image_destroy> {
   public:
     using Handle::Handle;
     template <class Image> static Fallible<Samples> create(const Image &picture) {
         Samples samples;
         skep_image image = {};
-        detail::Outcome outcome = detail::look_at_image(picture, false, "picture", image).then([&] {
-            return skep_samples_create(&image, samples.put());
+        detail::Status status = detail::look_at_image(picture, false, "picture", image).then([&] {
+            return skep_packed_image_create(&image, samples.put());
         });
-        return detail::give(std::move(outcome), samples);
+        return detail::give(std::move(status), samples);
     }
 };
 
 /// Where patches are sampled and how samples are weighted.
-class Window : public detail::Handle<skep_window, skep_window_destroy> {
+class Window : public detail::Handle<skep_ncc_window, skep_ncc_window_destroy> {
   public:
     using Handle::Handle;
-    static Fallible<Window> create(std::uint32_t radius, std::uint32_t step, double spatial_sigma,
-                                   double colour_sigma, double min_variance = 1e-5) {
+    static Fallible<Window> create(std::uint32_t radius, std::uint32_t step, double sigma_spatial,
+                                   double sigma_color, double min_variance = 1e-5) {
         Window window;
-        return detail::give(skep_window_create(radius, step, spatial_sigma, colour_sigma,
+        return detail::give(skep_ncc_window_create(radius, step, sigma_spatial, sigma_color,
                                                min_variance, window.put()),
                             window);
     }
@@ -92,7 +92,7 @@ inline Fallible<void> patch_ncc(const Window &window, const Samples &reference,
                                 const Samples &source, Span<const Pixel> pixels,
                                 Span<const Homography> homographies, Span<float> ncc) {
     if (homographies.size() != pixels.size() || ncc.size() != pixels.size())
-        return detail::give(detail::Outcome::argument(
+        return detail::give(detail::Status::argument(
             "homographies and ncc",
             std::to_string(homographies.size()) + " and " + std::to_string(ncc.size()) + " long",
             std::to_string(pixels.size()) + " as the pixels"));

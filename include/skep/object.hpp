@@ -28,12 +28,12 @@ class Watch {
     }
 
     /// Makes a call of the C interface that takes a callback: `call(callback, user)`.
-    template <class Call> detail::Outcome follow(Call call) const {
+    template <class Call> detail::Status follow(Call call) const {
         Follower follower{tell_, nullptr};
-        detail::Outcome outcome =
+        detail::Status status =
             call(tell_ ? &Follower::tell : nullptr, static_cast<void *>(&follower));
         if (follower.thrown) std::rethrow_exception(follower.thrown);
-        return outcome;
+        return status;
     }
 
   private:

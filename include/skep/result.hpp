@@ -11,7 +11,7 @@ inline namespace SKEP_FLAVOUR {
 struct Points {
     std::vector<double> positions;
     std::vector<float> normals;
-    std::vector<std::uint8_t> colours;
+    std::vector<std::uint8_t> colors;
 };
 
 /// Numbers of views, element after element, and how many of them each element has.
@@ -30,26 +30,26 @@ class Cloud : public detail::Handle<skep_cloud, skep_cloud_destroy> {
     Fallible<Points> points() const {
         Points points;
         std::size_t count = 0;
-        detail::Outcome outcome =
-            detail::Outcome(skep_cloud_get_count(get(), &count, nullptr)).then([&] {
+        detail::Status status =
+            detail::Status(skep_cloud_get_count(get(), &count, nullptr)).then([&] {
                 points.positions.resize(3 * count), points.normals.resize(3 * count),
-                    points.colours.resize(3 * count);
+                    points.colors.resize(3 * count);
                 return skep_cloud_get_points(get(), points.positions.data(), points.normals.data(),
-                                             points.colours.data(), count);
+                                             points.colors.data(), count);
             });
-        return detail::give(std::move(outcome), points);
+        return detail::give(std::move(status), points);
     }
     /// The views each point was fused from.
     Fallible<ViewLists> views() const {
         ViewLists lists;
         std::size_t count = 0, total = 0;
-        detail::Outcome outcome =
-            detail::Outcome(skep_cloud_get_count(get(), &count, &total)).then([&] {
+        detail::Status status =
+            detail::Status(skep_cloud_get_count(get(), &count, &total)).then([&] {
                 lists.counts.resize(count), lists.views.resize(total);
                 return skep_cloud_get_views(get(), lists.counts.data(), count, lists.views.data(),
                                             total);
             });
-        return detail::give(std::move(outcome), lists);
+        return detail::give(std::move(status), lists);
     }
     Fallible<void> write_ply(const std::string &file) const {
         return detail::give(skep_cloud_write_ply(get(), file.c_str()));
@@ -89,11 +89,11 @@ class Result : public detail::Handle<skep_result, skep_result_destroy> {
         return copied<float>(skep_result_get_cost, 1, view);
     }
     /// SKEP_PIXEL_ values.
-    template <class M> Fallible<void> outcome(std::uint32_t view, M &&map) const {
-        return detail::give(copy<std::uint8_t>(skep_result_get_outcome, 1, map, view));
+    template <class M> Fallible<void> status(std::uint32_t view, M &&map) const {
+        return detail::give(copy<std::uint8_t>(skep_result_get_status, 1, map, view));
     }
-    Fallible<Map<std::uint8_t>> outcome(std::uint32_t view) const {
-        return copied<std::uint8_t>(skep_result_get_outcome, 1, view);
+    Fallible<Map<std::uint8_t>> status(std::uint32_t view) const {
+        return copied<std::uint8_t>(skep_result_get_status, 1, view);
     }
     template <class M> Fallible<void> source_count(std::uint32_t view, M &&map) const {
         return detail::give(copy<std::uint16_t>(skep_result_get_source_count, 1, map, view));
@@ -118,8 +118,8 @@ class Result : public detail::Handle<skep_result, skep_result_destroy> {
     Fallible<MapView<const float>> borrow_cost(std::uint32_t view) const {
         return borrowed<float>(skep_result_borrow_cost, 1, view);
     }
-    Fallible<MapView<const std::uint8_t>> borrow_outcome(std::uint32_t view) const {
-        return borrowed<std::uint8_t>(skep_result_borrow_outcome, 1, view);
+    Fallible<MapView<const std::uint8_t>> borrow_status(std::uint32_t view) const {
+        return borrowed<std::uint8_t>(skep_result_borrow_status, 1, view);
     }
     Fallible<std::vector<std::uint32_t>> views() const {
         return detail::list<std::uint32_t>(
@@ -129,8 +129,8 @@ class Result : public detail::Handle<skep_result, skep_result_destroy> {
         return detail::list<std::uint32_t>(
             [&](auto... out) { return skep_result_get_sources(get(), view, out...); });
     }
-    Fallible<std::vector<skep_cycle>> cycles(std::uint32_t view) const {
-        return detail::list<skep_cycle>(
+    Fallible<std::vector<skep_cycle_record>> cycles(std::uint32_t view) const {
+        return detail::list<skep_cycle_record>(
             [&](auto... out) { return skep_result_get_cycles(get(), view, out...); });
     }
     Fallible<skep_statistics> statistics(std::uint32_t view) const {
@@ -159,11 +159,11 @@ class Result : public detail::Handle<skep_result, skep_result_destroy> {
 
   private:
     template <class T, class Call, class M, class... Where>
-    detail::Outcome copy(Call call, std::uint32_t channels, M &map, std::uint32_t view,
+    detail::Status copy(Call call, std::uint32_t channels, M &map, std::uint32_t view,
                          Where... where) const {
         Size size;
         MapView<T> into;
-        return detail::Outcome(skep_result_get_size(get(), view, &size.width, &size.height))
+        return detail::Status(skep_result_get_size(get(), view, &size.width, &size.height))
             .then([&] { return detail::make<T>(map, size, channels, "map", into); })
             .then([&] { return call(get(), view, where..., into.data, into.stride_bytes); });
     }
@@ -171,20 +171,20 @@ class Result : public detail::Handle<skep_result, skep_result_destroy> {
     Fallible<Map<T>> copied(Call call, std::uint32_t channels, std::uint32_t view,
                             Where... where) const {
         Map<T> map;
-        detail::Outcome outcome = copy<T>(call, channels, map, view, where...);
-        return detail::give(std::move(outcome), map);
+        detail::Status status = copy<T>(call, channels, map, view, where...);
+        return detail::give(std::move(status), map);
     }
     template <class T, class Call>
     Fallible<MapView<const T>> borrowed(Call call, std::uint32_t channels,
                                         std::uint32_t view) const {
         MapView<const T> map;
-        detail::Outcome outcome =
-            detail::Outcome(skep_result_get_size(get(), view, &map.width, &map.height)).then([&] {
+        detail::Status status =
+            detail::Status(skep_result_get_size(get(), view, &map.width, &map.height)).then([&] {
                 return call(get(), view, &map.data);
             });
         map.channels = channels;
         map.stride_bytes = std::size_t(map.width) * channels * sizeof(T);
-        return detail::give(std::move(outcome), map);
+        return detail::give(std::move(status), map);
     }
 };
 
@@ -192,12 +192,12 @@ class Result : public detail::Handle<skep_result, skep_result_destroy> {
 inline Fallible<Result> reconstruct(const Scene &scene, OptionsOrDefault options = {},
                                     const Watch &watch = {}) {
     Result result;
-    detail::Outcome outcome = options.check().then([&] {
+    detail::Status status = options.check().then([&] {
         return watch.follow([&](skep_progress_fn callback, void *user) {
             return skep_reconstruct(scene.get(), options.get(), callback, user, result.put());
         });
     });
-    return detail::give(std::move(outcome), result);
+    return detail::give(std::move(status), result);
 }
 
 /// A view to be fused: skep::look gives the maps, skep::image the picture.
@@ -214,24 +214,24 @@ inline Fallible<Cloud> fuse(Span<const FusionView> views, OptionsOrDefault optio
                             const Watch &watch = {}) {
     Cloud cloud;
     std::vector<skep_fusion_view> raw;
-    detail::Outcome outcome = options.check();
+    detail::Status status = options.check();
     for (const FusionView &view : views) {
         const MapView<const float> &depth = view.depth, &normal = view.normal;
-        if (outcome && (depth.width != normal.width || depth.height != normal.height))
-            outcome =
-                detail::Outcome::argument("views[" + std::to_string(raw.size()) + "].normal",
+        if (status && (depth.width != normal.width || depth.height != normal.height))
+            status =
+                detail::Status::argument("views[" + std::to_string(raw.size()) + "].normal",
                                           detail::by(normal.width, normal.height),
                                           detail::by(depth.width, depth.height) + ", as the depth");
         raw.push_back({&view.camera, depth.width, depth.height, depth.data, depth.stride_bytes,
                        normal.data, normal.stride_bytes, view.image ? &*view.image : nullptr,
                        view.overlap.data(), view.overlap.size()});
     }
-    outcome = std::move(outcome).then([&] {
+    status = std::move(status).then([&] {
         return watch.follow([&](skep_progress_fn callback, void *user) {
             return skep_fuse(raw.data(), raw.size(), options.get(), callback, user, cloud.put());
         });
     });
-    return detail::give(std::move(outcome), cloud);
+    return detail::give(std::move(status), cloud);
 }
 
 } // namespace SKEP_FLAVOUR

@@ -61,10 +61,10 @@ class OptionsOrDefault {
     OptionsOrDefault(const Options &options) : raw_(options.get()), is_empty_(!options) {}
     const skep_options *get() const noexcept { return raw_; }
     /// Options that were moved from are not the default.
-    detail::Outcome check() const {
-        return is_empty_ ? detail::Outcome::argument("options", "empty",
+    detail::Status check() const {
+        return is_empty_ ? detail::Status::argument("options", "empty",
                                                      "options that were not moved from")
-                         : detail::Outcome();
+                         : detail::Status();
     }
 
   private:
@@ -98,17 +98,17 @@ class Scene : public detail::Handle<skep_scene, skep_scene_destroy> {
         return detail::give(skep_scene_write_colmap(get(), folder.c_str()));
     }
 
-    /// Adds a picture, which is copied, and returns its number. Colours are in OpenCV's order
+    /// Adds a picture, which is copied, and returns its number. Colors are in OpenCV's order
     /// unless skep::image says otherwise.
     template <class Image>
     Fallible<std::uint32_t> add_view(const Image &picture, const skep_camera &camera,
                                      const char *name = nullptr) {
         std::uint32_t view = 0;
         skep_image image = {};
-        detail::Outcome outcome = detail::look_at_image(picture, false, "picture", image).then([&] {
+        detail::Status status = detail::look_at_image(picture, false, "picture", image).then([&] {
             return skep_scene_add_view(get(), name, &image, &camera, &view);
         });
-        return detail::give(std::move(outcome), view);
+        return detail::give(std::move(status), view);
     }
     /// A mask of the view's size, 8 bits a pixel, 0 where no depth is wanted.
     template <class Mask> Fallible<void> set_mask(std::uint32_t view, const Mask &mask) {
@@ -138,7 +138,7 @@ class Scene : public detail::Handle<skep_scene, skep_scene_destroy> {
                               Span<const std::uint32_t> views) {
         if (positions.size() != 3 * view_counts.size())
             return detail::give(
-                detail::Outcome::argument("positions", std::to_string(positions.size()) + " long",
+                detail::Status::argument("positions", std::to_string(positions.size()) + " long",
                                           std::to_string(3 * view_counts.size())));
         return detail::give(skep_scene_add_points(get(), positions.data(), view_counts.size(),
                                                   view_counts.data(), views.data(), views.size()));
@@ -159,9 +159,9 @@ class Scene : public detail::Handle<skep_scene, skep_scene_destroy> {
     }
     Fallible<std::string> name(std::uint32_t view) const {
         std::string name;
-        detail::Outcome outcome = detail::text(
+        detail::Status status = detail::text(
             name, [&](auto... out) { return skep_scene_get_name(get(), view, out...); });
-        return detail::give(std::move(outcome), name);
+        return detail::give(std::move(status), name);
     }
     Fallible<Range> depth_range(std::uint32_t view) const {
         Range range;

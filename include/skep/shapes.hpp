@@ -131,12 +131,12 @@ inline std::string by(long long a, long long b) {
 
 /// Looks at a map of any kind as `channels` numbers of type T a pixel.
 template <class T, class M>
-Outcome look(M &map, std::uint32_t channels, const char *name, MapView<T> &view) {
+Status look(M &map, std::uint32_t channels, const char *name, MapView<T> &view) {
     std::uint32_t found = 0;
     bool fits = true;
     if constexpr (IsMat<M>::value) {
         if (map.rows <= 0 || map.cols <= 0)
-            return Outcome::argument(name, by(map.cols, map.rows),
+            return Status::argument(name, by(map.cols, map.rows),
                                      "a matrix of two dimensions that is not empty");
         view.data = reinterpret_cast<T *>(map.data);
         view.width = std::uint32_t(map.cols), view.height = std::uint32_t(map.rows);
@@ -154,14 +154,14 @@ Outcome look(M &map, std::uint32_t channels, const char *name, MapView<T> &view)
     }
     view.channels = channels;
     if (fits && found == channels) return {};
-    return Outcome::argument(
+    return Status::argument(
         name, "a map of " + std::to_string(found) + " channel(s) of another type or length",
         std::to_string(channels) + " channel(s) of " + std::to_string(sizeof(T)) + " bytes");
 }
 
 /// Gives a map of any kind this size, or finds that it has it, and looks at it.
 template <class T, class M>
-Outcome make(M &map, Size size, std::uint32_t channels, const char *name, MapView<T> &view) {
+Status make(M &map, Size size, std::uint32_t channels, const char *name, MapView<T> &view) {
     if constexpr (IsMat<M>::value) {
         if constexpr (CanCreate<M>::value)
             map.create(int(size.height), int(size.width),
@@ -169,16 +169,16 @@ Outcome make(M &map, Size size, std::uint32_t channels, const char *name, MapVie
     } else if constexpr (!std::is_pointer_v<decltype(map.data)>) {
         map = Map<T>(size, channels);
     }
-    return look<T>(map, channels, name, view).then([&]() -> Outcome {
+    return look<T>(map, channels, name, view).then([&]() -> Status {
         if (view.width == size.width && view.height == size.height) return {};
-        return Outcome::argument(name, by(view.width, view.height),
+        return Status::argument(name, by(view.width, view.height),
                                  by(size.width, size.height) + ", as the view");
     });
 }
 
 /// Reads a matrix, row by row.
 template <class M>
-Outcome read(const M &matrix, int rows, int columns, const char *name, double *out) {
+Status read(const M &matrix, int rows, int columns, const char *name, double *out) {
     static_assert(IsCalled<const M>::value || IsMat<const M>::value ||
                       IsSubscriptedTwice<const M>::value,
                   "a matrix is called with (row, column), subscripted twice, or a cv::Mat");
@@ -189,7 +189,7 @@ Outcome read(const M &matrix, int rows, int columns, const char *name, double *o
         has_rows = matrix.rows, has_columns = matrix.cols;
     else has_rows = (long long)std::size(matrix), has_columns = (long long)std::size(matrix[0]);
     if (has_rows != rows || has_columns != columns)
-        return Outcome::argument(name, by(has_rows, has_columns), by(rows, columns));
+        return Status::argument(name, by(has_rows, has_columns), by(rows, columns));
     for (int i = 0; i < rows * columns; ++i) {
         const int row = i / columns, column = i % columns;
         if constexpr (IsCalled<const M>::value) {
@@ -199,7 +199,7 @@ Outcome read(const M &matrix, int rows, int columns, const char *name, double *o
         } else {
             const auto *start = matrix.data + std::size_t(matrix.step) * std::size_t(row);
             if (matrix.channels() != 1 || (matrix.depth() != 5 && matrix.depth() != 6))
-                return Outcome::argument(name, "a matrix of another type",
+                return Status::argument(name, "a matrix of another type",
                                          "one channel of float or double");
             if (matrix.depth() == 5)
                 out[i] = double(reinterpret_cast<const float *>(start)[column]);
@@ -210,15 +210,15 @@ Outcome read(const M &matrix, int rows, int columns, const char *name, double *o
 }
 
 /// Reads a vector of three.
-template <class V> Outcome read_vector(const V &vector, const char *name, double *out) {
+template <class V> Status read_vector(const V &vector, const char *name, double *out) {
     if constexpr (IsCalled<const V>::value || IsMat<const V>::value) {
-        const Outcome column = read(vector, 3, 1, name, out);
-        return column ? column : read(vector, 1, 3, name, out) ? Outcome() : column;
+        const Status column = read(vector, 3, 1, name, out);
+        return column ? column : read(vector, 1, 3, name, out) ? Status() : column;
     } else {
         static_assert(IsSubscripted<const V>::value, "a vector is a matrix or subscripted");
         if constexpr (HasSize<const V>::value)
             if (std::size(vector) != 3)
-                return Outcome::argument(name, std::to_string(std::size(vector)) + " long", "3");
+                return Status::argument(name, std::to_string(std::size(vector)) + " long", "3");
         for (int i = 0; i < 3; ++i)
             out[i] = double(vector[i]);
         return {};
@@ -226,7 +226,7 @@ template <class V> Outcome read_vector(const V &vector, const char *name, double
 }
 
 template <class Image>
-Outcome look_at_image(const Image &image, bool is_rgb, const char *name, skep_image &out) {
+Status look_at_image(const Image &image, bool is_rgb, const char *name, skep_image &out) {
     if constexpr (std::is_same_v<Image, skep_image>) {
         out = image;
         return {};
@@ -235,13 +235,13 @@ Outcome look_at_image(const Image &image, bool is_rgb, const char *name, skep_im
                       "a picture is a skep_image or has the shape of cv::Mat");
         const int depth = image.depth(), channels = image.channels();
         if (image.rows <= 0 || image.cols <= 0)
-            return Outcome::argument(name, by(image.cols, image.rows),
+            return Status::argument(name, by(image.cols, image.rows),
                                      "a picture that is not empty");
         if ((depth != 0 && depth != 2 && depth != 5) ||
             (channels != 1 && channels != 3 && channels != 4))
-            return Outcome::argument(name, "of another type",
+            return Status::argument(name, "of another type",
                                      "8, 16 or float bits of 1, 3 or 4 channels");
-        const int layout = channels == 1   ? SKEP_FORMAT_GREY
+        const int layout = channels == 1   ? SKEP_FORMAT_GRAY
                            : channels == 3 ? (is_rgb ? SKEP_FORMAT_RGB : SKEP_FORMAT_BGR)
                                            : (is_rgb ? SKEP_FORMAT_RGBA : SKEP_FORMAT_BGRA);
         const int bits = depth == 0 ? 0 : depth == 2 ? SKEP_FORMAT_16 : SKEP_FORMAT_FLOAT;
@@ -254,11 +254,11 @@ Outcome look_at_image(const Image &image, bool is_rgb, const char *name, skep_im
 
 enum class Order { Bgr, Rgb };
 
-/// Looks at a picture of the shape of cv::Mat; colours are in OpenCV's order unless told otherwise.
+/// Looks at a picture of the shape of cv::Mat; colors are in OpenCV's order unless told otherwise.
 template <class Image> Fallible<skep_image> image(const Image &picture, Order order = Order::Bgr) {
     skep_image out = {};
-    detail::Outcome outcome = detail::look_at_image(picture, order == Order::Rgb, "picture", out);
-    return detail::give(std::move(outcome), out);
+    detail::Status status = detail::look_at_image(picture, order == Order::Rgb, "picture", out);
+    return detail::give(std::move(status), out);
 }
 
 /// Looks at any map as `channels` numbers of type T a pixel, such as look<float>(depth) or
@@ -266,8 +266,8 @@ template <class Image> Fallible<skep_image> image(const Image &picture, Order or
 template <class T, class M>
 Fallible<MapView<const T>> look(const M &map, std::uint32_t channels = 1) {
     MapView<const T> view;
-    detail::Outcome outcome = detail::look<const T>(map, channels, "map", view);
-    return detail::give(std::move(outcome), view);
+    detail::Status status = detail::look<const T>(map, channels, "map", view);
+    return detail::give(std::move(status), view);
 }
 
 /// A camera from its matrices: K has no skew, and x_cam = R X + t.
@@ -275,17 +275,17 @@ template <class K, class R, class T>
 Fallible<skep_camera> camera(const K &k, const R &rotation, const T &translation) {
     skep_camera camera = {};
     double m[9] = {};
-    detail::Outcome outcome =
+    detail::Status status =
         detail::read(k, 3, 3, "K", m)
             .then([&] { return detail::read(rotation, 3, 3, "R", camera.rotation); })
             .then([&] { return detail::read_vector(translation, "t", camera.translation); })
-            .then([&]() -> detail::Outcome {
+            .then([&]() -> detail::Status {
                 if (m[1] == 0 && m[3] == 0 && m[6] == 0 && m[7] == 0 && m[8] == 1) return {};
-                return detail::Outcome::argument("K", "another matrix",
+                return detail::Status::argument("K", "another matrix",
                                                  "[fx 0 cx; 0 fy cy; 0 0 1]");
             });
     camera.fx = m[0], camera.cx = m[2], camera.fy = m[4], camera.cy = m[5];
-    return detail::give(std::move(outcome), camera);
+    return detail::give(std::move(status), camera);
 }
 
 } // namespace SKEP_FLAVOUR

@@ -1,17 +1,17 @@
 //! What the costs of a hypothesis in its source views add up to.
 
+use crate::matching::Projections;
 use crate::simd::{LANES, Simd};
-use crate::views::Placed;
 use std::cmp::Ordering;
 
-/// The largest k of [`Aggregation::BestViews`](crate::options::Aggregation::BestViews).
+/// The largest k of the option `cost.best_views`.
 pub const MAX_BEST_VIEWS: usize = 8;
 
 /// The hypothesis at work in the source views of a group.
 #[derive(Debug, Clone, Copy)]
 pub struct InViews {
     /// Where it falls in them.
-    pub placed: Placed,
+    pub projections: Projections,
     /// The least it can cost in each view that has it in its image: the geometric term, and the photometric one as soon
     /// as it is known.
     pub least: [f32; LANES],
@@ -20,7 +20,7 @@ pub struct InViews {
 /// Number of views that have the hypothesis in their image.
 #[inline(always)]
 pub fn seen(views: &[InViews]) -> usize {
-    views.iter().map(|view| view.placed.inside.count_ones() as usize).sum()
+    views.iter().map(|view| view.projections.inside.count_ones() as usize).sum()
 }
 
 /// The number of views in which the hypothesis costs less than in this one; of equals the earlier cost less.
@@ -28,16 +28,16 @@ pub fn seen(views: &[InViews]) -> usize {
 pub fn cheaper<S: Simd>(simd: S, views: &[InViews], group: usize, lane: usize) -> usize {
     let cost = simd.splat(views[group].least[lane]);
     let mut count = 0;
-    for (other, InViews { placed, least }) in views.iter().enumerate() {
+    for (other, InViews { projections, least }) in views.iter().enumerate() {
         let costs = simd.load(least);
-        let not_less = simd.at_least(costs, cost);
+        let not_less = simd.simd_ge(costs, cost);
         let earlier = match other.cmp(&group) {
             Ordering::Less => u8::MAX,
             Ordering::Equal => (1 << lane) - 1,
             Ordering::Greater => 0,
         };
-        let equal = not_less & simd.at_least(cost, costs);
-        count += ((!not_less | equal & earlier) & placed.inside).count_ones() as usize;
+        let equal = not_less & simd.simd_ge(cost, costs);
+        count += ((!not_less | equal & earlier) & projections.inside).count_ones() as usize;
     }
     count
 }
@@ -47,10 +47,10 @@ pub fn cheaper<S: Simd>(simd: S, views: &[InViews], group: usize, lane: usize) -
 pub fn sum<S: Simd>(simd: S, views: &[InViews]) -> f32 {
     let zero = simd.splat(0.0);
     let mut sum = zero;
-    for InViews { placed, least } in views {
-        sum = simd.add(sum, simd.select(placed.inside, simd.load(least), zero));
+    for InViews { projections, least } in views {
+        sum = simd.add(sum, simd.select(projections.inside, simd.load(least), zero));
     }
-    simd.sum(sum)
+    simd.reduce_sum(sum)
 }
 
 /// The sum of the `best` smallest of those `count` costs.
@@ -62,10 +62,10 @@ pub fn sum_of_least<S: Simd>(simd: S, views: &[InViews], count: usize, best: usi
     if count == best + 1 {
         let zero = simd.splat(0.0);
         let mut largest = zero;
-        for InViews { placed, least } in views {
-            largest = simd.max(largest, simd.select(placed.inside, simd.load(least), zero));
+        for InViews { projections, least } in views {
+            largest = simd.max(largest, simd.select(projections.inside, simd.load(least), zero));
         }
-        return sum(simd, views) - simd.largest(largest);
+        return sum(simd, views) - simd.reduce_max(largest);
     }
     match best {
         1 => sum_of::<1>(views),
@@ -83,9 +83,9 @@ pub fn sum_of_least<S: Simd>(simd: S, views: &[InViews], count: usize, best: usi
 #[inline(always)]
 fn sum_of<const BEST: usize>(views: &[InViews]) -> f32 {
     let mut least = [f32::INFINITY; BEST];
-    for InViews { placed, least: costs } in views {
+    for InViews { projections, least: costs } in views {
         for (lane, &cost) in costs.iter().enumerate() {
-            let mut cost = if placed.inside >> lane & 1 != 0 { cost } else { f32::INFINITY };
+            let mut cost = if projections.inside >> lane & 1 != 0 { cost } else { f32::INFINITY };
             // Without branches: which costs are small cannot be predicted.
             for place in &mut least {
                 (*place, cost) = (smaller(*place, cost), larger(*place, cost));

@@ -1,20 +1,20 @@
-//! The colonies of all pixels of one checkerboard colour, and what they start from.
+//! The colonies of all pixels of one checkerboard color, and what they start from.
 
-use super::food::FoodSource;
+use super::food_source::FoodSource;
 use glam::Vec3;
 
-/// A plane another view offers to a pixel; depth 0 where there is none.
+/// A plane another view candidates to a pixel; depth 0 where there is none.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Offer {
+pub struct Candidate {
     /// Depth at the pixel.
     pub depth: f32,
     /// Unit normal in the camera frame.
     pub normal: Vec3,
-    /// Its cost in the view that offers it.
+    /// Its cost in the view that candidates it.
     pub cost: f32,
 }
 
-/// The colonies of one colour of the checkerboard. While one colour searches, it only reads the other: the result does
+/// The colonies of one color of the checkerboard. While one color searches, it only reads the other: the result does
 /// not depend on the order of the pixels.
 #[derive(Debug, Clone)]
 pub struct Colonies {
@@ -24,7 +24,7 @@ pub struct Colonies {
     pub height: usize,
     /// Food sources of each colony, the best first.
     pub foods_per_colony: usize,
-    /// Row by row; each row holds the colonies of this colour from left to right.
+    /// Row by row; each row holds the colonies of this color from left to right.
     pub foods: Vec<FoodSource>,
 }
 
@@ -41,15 +41,15 @@ impl Colonies {
         self.width.div_ceil(2) * self.foods_per_colony
     }
 
-    /// The best food source of a pixel of this colour.
+    /// The best food source of a pixel of this color.
     #[inline(always)]
     pub fn best(&self, x: usize, y: usize) -> &FoodSource {
         &self.foods[y * self.row_len() + x / 2 * self.foods_per_colony]
     }
 }
 
-/// The colour of a pixel: 0 or 1.
+/// The color of a pixel: 0 or 1.
 #[inline(always)]
-pub fn colour(x: usize, y: usize) -> usize {
+pub fn color(x: usize, y: usize) -> usize {
     (x + y) % 2
 }

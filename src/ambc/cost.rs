@@ -2,13 +2,15 @@
 
 use super::aggregation::{InViews, cheaper, seen, sum, sum_of_least};
 use super::colony::Colonies;
-use super::food::{FoodSource, cost_to_beat};
-use super::smoothness::{SmoothnessRules, Surroundings};
-use crate::kernels::{MAX_COST, ReferencePatch, SlantedPlane, Window, patch_costs};
-use crate::maps::Counts;
-use crate::options::{Aggregation, Options};
+use super::food_source::{FoodSource, cost_to_beat};
+use super::smoothness_term::{SmoothnessRules, Surroundings};
+use crate::ambc::Counts;
+use crate::geometry::SlantedPlane;
+use crate::geometry::ViewSets;
+use crate::matching::{Group, Problem, Projections, SourceProjector};
+use crate::matching::{MAX_COST, ReferencePatch, Window, patch_costs};
+use crate::options::Options;
 use crate::simd::{LANES, Simd};
-use crate::views::{Group, Placed, Placements, Reference, ViewSets};
 use glam::Vec3;
 
 type Lanes = [f32; LANES];
@@ -16,7 +18,8 @@ type Lanes = [f32; LANES];
 /// How source views' costs become a hypothesis' cost.
 #[derive(Debug, Clone, Copy)]
 pub struct CostRules {
-    aggregation: Aggregation,
+    /// Views whose mean is the cost; 0 takes the sum over all (equation 3 of the paper).
+    best_views: usize,
     /// Hypotheses in fewer views cost infinitely much.
     min_views: usize,
     noise_ratio: f32,
@@ -25,7 +28,7 @@ pub struct CostRules {
 }
 
 /// How disagreement with the source views' validated depths is priced: by its square, which leaves hypotheses that nearly
-/// agree to the images, up to a limit, so that a wrong neighbour cannot rule out a good match.
+/// agree to the images, up to a limit, so that a wrong neighbor cannot rule out a good match.
 #[derive(Debug, Clone, Copy)]
 struct GeometricRules {
     /// Cost of a square of relative disagreement; 0 without the geometric term.
@@ -39,34 +42,41 @@ struct GeometricRules {
 impl CostRules {
     /// The rules of these options; the geometric term needs validated solutions.
     pub fn new(options: &Options, with_geometric_term: bool) -> CostRules {
-        let weight = if with_geometric_term { options.geometric_weight } else { 0.0 };
-        let unknown = options.geometric_unknown.min(options.geometric_limit) / options.geometric_limit;
+        let weight = if with_geometric_term { options.cost.geom_consistency_weight } else { 0.0 };
+        let max_error = options.cost.geom_consistency_max_error;
+        let missing = options.cost.geom_consistency_missing_error.min(max_error) / max_error;
         CostRules {
-            aggregation: options.aggregation,
-            min_views: options.min_matched(),
-            noise_ratio: options.noise_ratio as f32,
+            best_views: options.cost.best_views as usize,
+            min_views: options.min_matched_views(),
+            noise_ratio: options.window.min_texture_to_noise as f32,
             geometric: GeometricRules {
-                weight: (weight * (100.0 / options.geometric_limit).powi(2)) as f32,
-                limit: (options.geometric_limit / 100.0) as f32,
-                unknown: (weight * unknown.powi(2)) as f32,
+                weight: (weight / max_error.powi(2)) as f32,
+                limit: max_error as f32,
+                unknown: (weight * missing.powi(2)) as f32,
             },
             smoothness: SmoothnessRules {
-                weight: options.smoothness as f32,
-                depth_scale: options.smoothness_depth as f32,
-                normal_scale: (1.0 - options.smoothness_normal.to_radians().cos()) as f32,
+                weight: options.cost.smoothness_weight as f32,
+                depth_scale: options.cost.smoothness_max_depth_error as f32,
+                normal_scale: (1.0 - options.cost.smoothness_max_normal_error.to_radians().cos()) as f32,
             },
         }
     }
 
     /// What a hypothesis of this depth costs in the views of a group by disagreeing with their validated depths.
     #[inline(always)]
-    fn geometric_costs<S: Simd>(&self, simd: S, group: &Group, placed: &Placed, depth: f32) -> Lanes {
+    fn geometric_costs<S: Simd>(
+        &self,
+        simd: S,
+        group: &Group,
+        projections: &Projections,
+        depth: f32,
+    ) -> Lanes {
         let GeometricRules { weight, limit, unknown } = self.geometric;
         if weight == 0.0 {
             return [0.0; LANES];
         }
-        let surfaces = group.surfaces(simd, placed);
-        let depth_there = simd.mul(simd.splat(depth), simd.load(&placed.centre[2]));
+        let surfaces = group.surfaces(simd, projections);
+        let depth_there = simd.mul(simd.splat(depth), simd.load(&projections.center[2]));
         let one = simd.splat(1.0);
         let difference = simd.sub(simd.mul(depth_there, simd.load(&surfaces.exact)), one);
         let square = simd.min(simd.mul(difference, difference), simd.splat(limit * limit));
@@ -78,15 +88,15 @@ impl CostRules {
 /// Evaluates hypotheses of one pixel after the other.
 pub struct Evaluator<'a, S: Simd> {
     simd: S,
-    reference: &'a Reference<'a>,
+    reference: &'a Problem<'a>,
     window: &'a Window,
     rules: CostRules,
     patch: ReferencePatch,
     has_texture: bool,
     is_weak: bool,
     ray: Vec3,
-    grey: u8,
-    placements: Placements<'a, S>,
+    gray: u8,
+    projector: SourceProjector<'a, S>,
     /// One for each group of the pixel's views.
     views: Vec<InViews>,
     surroundings: Surroundings,
@@ -98,7 +108,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     /// An evaluator that stands at no pixel yet.
     pub fn new(
         simd: S,
-        reference: &'a Reference<'a>,
+        reference: &'a Problem<'a>,
         window: &'a Window,
         rules: CostRules,
     ) -> Evaluator<'a, S> {
@@ -111,8 +121,8 @@ impl<'a, S: Simd> Evaluator<'a, S> {
             has_texture: false,
             is_weak: false,
             ray: Vec3::Z,
-            grey: 0,
-            placements: Placements::new(simd, reference),
+            gray: 0,
+            projector: SourceProjector::new(simd, reference),
             views: Vec::with_capacity(reference.sources.len().div_ceil(LANES)),
             surroundings: Surroundings::new(rules.smoothness),
             counts: Counts::default(),
@@ -121,7 +131,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
 
     /// The reference view.
     #[inline(always)]
-    pub fn reference(&self) -> &'a Reference<'a> {
+    pub fn reference(&self) -> &'a Problem<'a> {
         self.reference
     }
 
@@ -136,24 +146,24 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     pub fn go_to(&mut self, x: usize, y: usize, set: &[u32]) {
         self.patch.sample(self.simd, self.window, self.reference.image, x, y);
         self.has_texture = self.patch.has_texture(self.window);
-        self.grey = self.reference.image.grey(x, y);
-        let noise = self.reference.image.noise.variance(self.grey);
+        self.gray = self.reference.image.gray(x, y);
+        let noise = self.reference.image.noise.variance(self.gray);
         self.is_weak = self.patch.variance() < self.rules.noise_ratio * noise;
         let (x, y) = (x as f32, y as f32);
         self.ray = self.reference.ray(x, y);
-        self.placements.go_to(x, y, set);
+        self.projector.set_pixel_and_views(x, y, set);
     }
 
-    /// Lets the planes of the pixel's neighbours have a say.
+    /// Lets the planes of the pixel's neighbors have a say.
     #[inline(always)]
-    pub fn look_around(&mut self, neighbours: &Colonies, (x, y): (usize, usize)) {
-        self.surroundings.look(self.reference, self.window, neighbours, (x, y));
+    pub fn look_around(&mut self, neighbors: &Colonies, (x, y): (usize, usize)) {
+        self.surroundings.look(self.reference, self.window, neighbors, (x, y));
     }
 
-    /// How alike the pixel and another one look, from 0 to 1: the bilateral weight of their grey values.
+    /// How alike the pixel and another one look, from 0 to 1: the bilateral weight of their gray values.
     #[inline(always)]
     pub fn likeness(&self, x: usize, y: usize) -> f32 {
-        self.window.likeness(self.grey, self.reference.image.grey(x, y))
+        self.window.likeness(self.gray, self.reference.image.gray(x, y))
     }
 
     /// Whether the pixel's patch can be matched.
@@ -178,9 +188,9 @@ impl<'a, S: Simd> Evaluator<'a, S> {
             #[inline(always)]
             || {
                 self.place(food);
-                match self.rules.aggregation {
-                    Aggregation::AllViews => self.all_views(food, bound),
-                    Aggregation::BestViews(count) => self.best_views(food, bound, count as usize),
+                match self.rules.best_views {
+                    0 => self.all_views(food, bound),
+                    count => self.best_views(food, bound, count),
                 }
             },
         );
@@ -222,9 +232,9 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         for group in 0..self.views.len() {
             self.views[group].least = [0.0; LANES];
             self.add_photometric_costs(&plane, group);
-            let InViews { placed, least } = &self.views[group];
+            let InViews { projections, least } = &self.views[group];
             for (lane, cost) in least.iter().enumerate() {
-                if placed.inside >> lane & 1 != 0 {
+                if projections.inside >> lane & 1 != 0 {
                     (sum, count) = (sum + cost, count + 1);
                 }
             }
@@ -239,8 +249,10 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         self.place(food);
         let unknown = self.rules.geometric.unknown;
         let agreeing: usize = (self.views.iter())
-            .map(|InViews { placed, least }| {
-                (0..LANES).filter(|&lane| placed.inside >> lane & 1 != 0 && least[lane] < unknown).count()
+            .map(|InViews { projections, least }| {
+                (0..LANES)
+                    .filter(|&lane| projections.inside >> lane & 1 != 0 && least[lane] < unknown)
+                    .count()
             })
             .sum();
         let all = seen(&self.views);
@@ -255,38 +267,38 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         if kept >= self.rules.min_views {
             set.fill(0);
             for group in 0..self.views.len() {
-                for (lane, &source) in self.placements.groups()[group].sources().iter().enumerate() {
+                for (lane, &source) in self.projector.groups()[group].sources().iter().enumerate() {
                     if cheaper(self.simd, &self.views, group, lane) < kept
-                        && self.views[group].placed.inside >> lane & 1 != 0
+                        && self.views[group].projections.inside >> lane & 1 != 0
                     {
                         ViewSets::insert_into(set, source);
                     }
                 }
             }
             // What was matched to choose the views is not matched again.
-            for (group, view) in self.placements.groups().iter().zip(&mut self.views) {
+            for (group, view) in self.projector.groups().iter().zip(&mut self.views) {
                 for (lane, &source) in group.sources().iter().enumerate() {
-                    view.placed.inside &= !(u8::from(!ViewSets::holds(set, source)) << lane);
+                    view.projections.inside &= !(u8::from(!ViewSets::holds(set, source)) << lane);
                 }
             }
-            self.placements.keep(set);
-            if let (Aggregation::BestViews(best), true) = (self.rules.aggregation, is_matched) {
-                let best = (best as usize).min(kept);
+            self.projector.set_views(set);
+            if self.rules.best_views > 0 && is_matched {
+                let best = self.rules.best_views.min(kept);
                 return sum_of_least(self.simd, &self.views, kept, best) / best as f32;
             }
         }
         self.cost(food, f32::INFINITY)
     }
 
-    /// Finds where a hypothesis falls in the views of the set. A view whose image its centre leaves does not count.
+    /// Finds where a hypothesis falls in the views of the set. A view whose image its center leaves does not count.
     #[inline(always)]
     fn place(&mut self, food: &FoodSource) {
-        let Evaluator { simd, placements, views, rules, .. } = self;
+        let Evaluator { simd, projector, views, rules, .. } = self;
         views.clear();
-        for group in placements.groups() {
-            let placed = group.place(*simd, food.depth);
-            let least = rules.geometric_costs(*simd, group, &placed, food.depth);
-            views.push(InViews { placed, least });
+        for group in projector.groups() {
+            let projections = group.project(*simd, food.depth);
+            let least = rules.geometric_costs(*simd, group, &projections, food.depth);
+            views.push(InViews { projections, least });
         }
     }
 
@@ -301,26 +313,31 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         self.simd.vectorize(
             #[inline(always)]
             || {
-                let Evaluator { simd, window, patch, reference, placements, views, .. } = self;
-                let (group, InViews { placed, least }) = (&placements.groups()[group], &mut views[group]);
+                let Evaluator { simd, window, patch, reference, projector, views, .. } = self;
+                let (group, InViews { projections, least }) = (&projector.groups()[group], &mut views[group]);
                 let slopes = group.slopes(*simd, plane);
                 let costs = patch_costs(
                     *simd,
                     window,
                     patch,
                     #[inline(always)]
-                    |lane| (reference.sources[group.sources()[lane]].image, placed.homography(&slopes, lane)),
-                    placed.inside,
+                    |lane| {
+                        (
+                            reference.sources[group.sources()[lane]].image,
+                            projections.homography(&slopes, lane),
+                        )
+                    },
+                    projections.inside,
                 );
                 for (least, cost) in least.iter_mut().zip(costs) {
                     *least += cost;
                 }
-                self.counts.ncc_evaluations += u64::from(placed.inside.count_ones());
+                self.counts.ncc_evaluations += u64::from(projections.inside.count_ones());
             },
         );
     }
 
-    /// Equation 3 of the paper: a small set is penalised.
+    /// Equation 3 of the paper: a small set is penalized.
     #[inline(always)]
     fn all_views(&mut self, food: &FoodSource, bound: f32) -> f32 {
         let count = seen(&self.views);
@@ -331,7 +348,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         let divisor = (count - 1) as f32;
         for group in 0..self.views.len() {
             if sum(self.simd, &self.views) >= bound * divisor {
-                self.counts.early_outs += 1;
+                self.counts.early_terminations += 1;
                 return f32::INFINITY;
             }
             self.add_photometric_costs(&plane, group);
@@ -355,11 +372,11 @@ impl<'a, S: Simd> Evaluator<'a, S> {
             if (is_guided || unmatched < best || limit <= 0.0)
                 && sum_of_least(self.simd, &self.views, count, best) >= limit
             {
-                self.counts.early_outs += 1;
+                self.counts.early_terminations += 1;
                 return f32::INFINITY;
             }
             self.add_photometric_costs(&plane, group);
-            unmatched -= self.views[group].placed.inside.count_ones() as usize;
+            unmatched -= self.views[group].projections.inside.count_ones() as usize;
         }
         sum_of_least(self.simd, &self.views, count, best) / best as f32
     }

@@ -1,8 +1,9 @@
 //! Employed bees: search around the colony's own food sources (section 5.3 of the paper).
 
 use super::cost::Evaluator;
-use super::food::{FoodSource, MIN_FACING};
+use super::food_source::FoodSource;
 use super::random::Random;
+use crate::geometry::MIN_FACING;
 use crate::simd::Simd;
 
 /// Perturbs the first `count` food sources towards or away from another one of the colony, `y' = y + R(-1,1) (y_n - y)`, in depth or

@@ -3,20 +3,22 @@
 mod aggregation;
 mod colony;
 mod cost;
+mod counts;
 mod employed;
-mod fitted;
-mod food;
+mod food_source;
+mod local_plane;
 mod onlooker;
 mod random;
-mod schedule;
 mod scout;
-mod smoothness;
+mod search;
+mod smoothness_term;
 #[cfg(test)]
 mod tests;
 
-pub use colony::Offer;
+pub use colony::Candidate;
 pub use cost::CostRules;
-pub use food::{FoodSource, MIN_FACING};
+pub use counts::Counts;
+pub use food_source::FoodSource;
 pub use onlooker::OnlookerRules;
 pub use random::{Random, stream};
-pub use schedule::{Assessment, Search, assess, band_rows};
+pub use search::{Assessment, Search, assess, band_rows};

@@ -1,12 +1,12 @@
-//! Onlooker bees: bring the best plane of a neighbouring colony (section 5.4 of the paper).
+//! Onlooker bees: bring the best plane of a neighboring colony (section 5.4 of the paper).
 
 use super::colony::Colonies;
 use super::cost::Evaluator;
-use super::food::FoodSource;
+use super::food_source::FoodSource;
 use super::random::Random;
 use crate::simd::Simd;
 
-/// The neighbours an onlooker may visit, all of the other colour: 1, 3 and 5 pixels along the axes, and a knight's move
+/// The neighbors an onlooker may visit, all of the other color: 1, 3 and 5 pixels along the axes, and a knight's move
 /// away.
 pub const OFFSETS: [(i32, i32); 20] = [
     (1, 0),
@@ -36,28 +36,28 @@ pub const OFFSETS: [(i32, i32); 20] = [
 pub struct OnlookerRules {
     /// Fitness reward of validated planes (section 5.6).
     pub reward: f32,
-    /// Random neighbours of which the one of the cheapest plane is visited; the paper's onlookers take the first.
+    /// Random neighbors of which the one of the cheapest plane is visited; the paper's onlookers take the first.
     pub draws: u32,
 }
 
-/// Offers every food source the best plane of a random neighbour of the other colour, transferred to this pixel, and
+/// Candidates every food source the best plane of a random neighbor of the other color, transferred to this pixel, and
 /// keeps what is better. A validated plane is rewarded in that comparison (section 5.6).
 #[inline(always)]
 pub fn send<S: Simd>(
     evaluator: &mut Evaluator<S>,
     foods: &mut [FoodSource],
-    neighbours: &Colonies,
+    neighbors: &Colonies,
     (x, y): (usize, usize),
     rules: OnlookerRules,
     random: &mut Random,
 ) {
     for food in foods {
-        let offer = draw_best(evaluator, neighbours, (x, y), rules.draws, random)
-            .and_then(|(dx, dy)| brought(evaluator, neighbours, (x, y), (dx, dy)))
-            .filter(|offer| !is_same_plane(food, offer));
-        let improved = match offer {
-            Some(offer) => {
-                evaluator.challenge(food, &offer, if offer.validated { rules.reward } else { 0.0 })
+        let candidate = draw_best(evaluator, neighbors, (x, y), rules.draws, random)
+            .and_then(|(dx, dy)| brought(evaluator, neighbors, (x, y), (dx, dy)))
+            .filter(|candidate| !is_same_plane(food, candidate));
+        let improved = match candidate {
+            Some(candidate) => {
+                evaluator.challenge(food, &candidate, if candidate.validated { rules.reward } else { 0.0 })
             }
             None => false,
         };
@@ -67,7 +67,7 @@ pub fn send<S: Simd>(
     }
 }
 
-/// The offset of the cheapest plane among so many random neighbours; of equals the first. Those that look different are
+/// The offset of the cheapest plane among so many random neighbors; of equals the first. Those that look different are
 /// reckoned dearer: where one surface has more texture than the next, its planes are the cheaper ones on both.
 #[inline(always)]
 fn draw_best<S: Simd>(
@@ -77,15 +77,15 @@ fn draw_best<S: Simd>(
     draws: u32,
     random: &mut Random,
 ) -> Option<(i32, i32)> {
-    let mut best = draw_neighbour(colonies, x, y, random)?;
+    let mut best = draw_neighbor(colonies, x, y, random)?;
     let cost = |(dx, dy): (i32, i32)| {
         let (x, y) = (x.wrapping_add_signed(dx as isize), y.wrapping_add_signed(dy as isize));
         let food = colonies.best(x, y);
-        // A neighbour that is masked or was never evaluated has nothing to offer.
+        // A neighbor that is masked or was never evaluated has nothing to candidate.
         if food.depth > 0.0 { food.cost + 1.0 - evaluator.likeness(x, y) } else { f32::INFINITY }
     };
     for _ in 1..draws {
-        if let Some(other) = draw_neighbour(colonies, x, y, random)
+        if let Some(other) = draw_neighbor(colonies, x, y, random)
             && cost(other) < cost(best)
         {
             best = other;
@@ -96,7 +96,7 @@ fn draw_best<S: Simd>(
 
 /// A random offset to a pixel inside the image: at a border the offset is mirrored, in tiny images there may be none.
 #[inline(always)]
-fn draw_neighbour(colonies: &Colonies, x: usize, y: usize, random: &mut Random) -> Option<(i32, i32)> {
+fn draw_neighbor(colonies: &Colonies, x: usize, y: usize, random: &mut Random) -> Option<(i32, i32)> {
     let (dx, dy) = OFFSETS[random.below(OFFSETS.len())];
     let mirrored = |at: usize, offset: i32, size: usize| {
         let inside = |offset: i32| at.checked_add_signed(offset as isize).is_some_and(|to| to < size);
@@ -105,17 +105,17 @@ fn draw_neighbour(colonies: &Colonies, x: usize, y: usize, random: &mut Random) 
     Some((mirrored(x, dx, colonies.width)?, mirrored(y, dy, colonies.height)?))
 }
 
-/// The best plane of the neighbour at this offset, moved to the pixel.
+/// The best plane of the neighbor at this offset, moved to the pixel.
 #[inline(always)]
 fn brought<S: Simd>(
     evaluator: &Evaluator<S>,
-    neighbours: &Colonies,
+    neighbors: &Colonies,
     (x, y): (usize, usize),
     (dx, dy): (i32, i32),
 ) -> Option<FoodSource> {
     let (nx, ny) = (x.wrapping_add_signed(dx as isize), y.wrapping_add_signed(dy as isize));
-    let best = neighbours.best(nx, ny);
-    // A neighbour that is masked or was never evaluated has nothing to offer.
+    let best = neighbors.best(nx, ny);
+    // A neighbor that is masked or was never evaluated has nothing to candidate.
     if best.depth <= 0.0 {
         return None;
     }

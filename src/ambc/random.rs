@@ -18,7 +18,7 @@ pub fn stream(parts: &[u64]) -> u64 {
 /// The golden ratio in 64 bits: multiples of it are spread evenly.
 const INCREMENT: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// A bijection that flips about half of the bits for every bit changed (splitmix64's finaliser).
+/// A bijection that flips about half of the bits for every bit changed (splitmix64's finalizer).
 #[inline(always)]
 fn mix(mut bits: u64) -> u64 {
     bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

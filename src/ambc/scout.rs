@@ -1,7 +1,7 @@
 //! Scout bees: search everywhere (section 5.5 of the paper).
 
 use super::cost::Evaluator;
-use super::food::FoodSource;
+use super::food_source::FoodSource;
 use super::random::Random;
 use crate::simd::Simd;
 

@@ -55,16 +55,16 @@ pub unsafe extern "C" fn skep_result_borrow_cost(
 /// The SKEP_PIXEL_ values inside the result, without a copy: height rows of width bytes, dense. Valid until the result
 /// is destroyed; only to be read.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_result_borrow_outcome(
+pub unsafe extern "C" fn skep_result_borrow_status(
     result: *const skep_result,
     view: u32,
-    outcome_out: *mut *const u8,
+    status_out: *mut *const u8,
 ) -> skep_status {
     guard(|| {
         // SAFETY: as the header demands of the caller.
-        let (result, out) = unsafe { (get(result, "result")?, out(outcome_out, "outcome_out")?) };
-        // An outcome is one byte, its discriminant.
-        out.set(result.view(view)?.outcome.as_ptr().cast());
+        let (result, out) = unsafe { (get(result, "result")?, out(status_out, "status_out")?) };
+        // An status is one byte, its discriminant.
+        out.set(result.view(view)?.status.as_ptr().cast());
         Ok(())
     })
 }

@@ -1,11 +1,11 @@
 //! Cameras in C.
 
 use super::status::Failure;
-use crate::camera::Camera;
+use crate::geometry::Camera;
 use glam::{DMat3, DVec3};
 
 /// A pinhole camera without distortion. x_cam = rotation * X_world + translation, with x right, y down, z forward;
-/// depth is z. The centre of the top-left pixel is (0, 0), as in OpenCV; COLMAP's principal points are half a pixel
+/// depth is z. The center of the top-left pixel is (0, 0), as in OpenCV; COLMAP's principal points are half a pixel
 /// larger. This struct never changes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]

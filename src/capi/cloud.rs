@@ -2,7 +2,7 @@
 
 use super::pointers::{destroy, get, out, wanted, wanted_one};
 use super::status::{guard, skep_status};
-use crate::maps::PointCloud;
+use crate::fusion::PointCloud;
 use std::sync::Arc;
 
 /// Fused points. Never changes: may be used from several threads at once.
@@ -39,14 +39,14 @@ pub unsafe extern "C" fn skep_cloud_get_count(
 }
 
 /// Copies the points: `positions` x, y, z in the world (3 doubles a point), `normals` unit vectors in the world (3
-/// floats a point), `colours` red, green, blue (3 bytes a point, 128 where no picture was given). Any of them may be
+/// floats a point), `colors` red, green, blue (3 bytes a point, 128 where no picture was given). Any of them may be
 /// NULL. `capacity` is the number of points each buffer has room for; SKEP_ERR_CAPACITY when it is less than there are.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_cloud_get_points(
     cloud: *const skep_cloud,
     positions: *mut f64,
     normals: *mut f32,
-    colours: *mut u8,
+    colors: *mut u8,
     capacity: usize,
 ) -> skep_status {
     guard(|| {
@@ -56,10 +56,10 @@ pub unsafe extern "C" fn skep_cloud_get_points(
             let needed = points.positions.len();
             let positions = wanted(positions.cast::<[f64; 3]>(), capacity, needed, "positions")?;
             let normals = wanted(normals.cast::<[f32; 3]>(), capacity, needed, "normals")?;
-            let colours = wanted(colours.cast::<[u8; 3]>(), capacity, needed, "colours")?;
+            let colors = wanted(colors.cast::<[u8; 3]>(), capacity, needed, "colors")?;
             positions.into_iter().for_each(|out| out.set(&points.positions));
             normals.into_iter().for_each(|out| out.set(&points.normals));
-            colours.into_iter().for_each(|out| out.set(&points.colours));
+            colors.into_iter().for_each(|out| out.set(&points.colors));
         }
         Ok(())
     })

@@ -7,8 +7,9 @@ use super::pointers::{get, give_list, out, path, slice, wanted};
 use super::result::skep_result;
 use super::scene::skep_scene;
 use super::status::{Failure, guard, skep_status};
+use crate::geometry::DepthRange;
 use crate::io::{self, Workspace};
-use crate::scene::{DepthRange, View};
+use crate::scene::View;
 use std::ffi::c_char;
 
 /// Reads a scene from a folder with images/ and a COLMAP model in sparse/ or sparse/0/, as `colmap image_undistorter`
@@ -92,7 +93,7 @@ pub unsafe extern "C" fn skep_result_write_workspace(
     })
 }
 
-/// Writes a cloud as binary PLY (x, y, z as floats, normals, colours), and the views of each point beside it in
+/// Writes a cloud as binary PLY (x, y, z as floats, normals, colors), and the views of each point beside it in
 /// FILE.vis, as COLMAP does.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_cloud_write_ply(cloud: *const skep_cloud, file: *const c_char) -> skep_status {

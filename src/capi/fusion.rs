@@ -8,11 +8,11 @@ use super::options::{options_or_default, skep_options};
 use super::pointers::{get, out, slice};
 use super::progress::{Host, skep_progress_fn};
 use super::status::{Failure, guard, skep_status};
-use crate::camera::Camera;
 use crate::fusion::{self, FusionView};
+use crate::geometry::Camera;
 use crate::image::Picture;
-use crate::maps::Maps;
-use crate::pool::JoinedPool;
+use crate::parallel::JoinedPool;
+use crate::scene::Maps;
 use std::ffi::c_void;
 use std::sync::Arc;
 
@@ -35,7 +35,7 @@ pub struct skep_fusion_view {
     pub normal: *const f32,
     /// Bytes from row to row of `normal`, at least 12 * width.
     pub normal_stride_bytes: usize,
-    /// For the colours, of the maps' size; NULL gives grey points.
+    /// For the colors, of the maps' size; NULL gives gray points.
     pub image_or_null: *const skep_image,
     /// The views that may see the same surface, as indices into the list of views; see skep_scene_get_overlap.
     pub overlap: *const u32,
@@ -119,7 +119,7 @@ pub unsafe extern "C" fn skep_fuse(
             .map(|view| FusionView {
                 camera: &view.camera,
                 maps: &view.maps,
-                outcome: None,
+                status: None,
                 picture: view.picture.as_ref(),
                 overlap: view.overlap,
             })

@@ -1,13 +1,13 @@
-//! Images in C's buffers: 8-bit, 16-bit and float, grey and colour, with strides.
+//! Images in C's buffers: 8-bit, 16-bit and float, gray and color, with strides.
 
 use super::status::{Failure, SKEP_ERR_NULL};
-use crate::camera::Camera;
+use crate::geometry::Camera;
 use crate::image::Picture;
 use std::ffi::c_void;
 
-/// Grey. An image's format is a layout, of 8 bits a channel, plus a depth when it is another: SKEP_FORMAT_BGR is 8-bit
+/// Gray. An image's format is a layout, of 8 bits a channel, plus a depth when it is another: SKEP_FORMAT_BGR is 8-bit
 /// BGR, SKEP_FORMAT_BGR + SKEP_FORMAT_16 is 16-bit BGR.
-pub const SKEP_FORMAT_GREY: u32 = 0;
+pub const SKEP_FORMAT_GRAY: u32 = 0;
 /// Red, green, blue.
 pub const SKEP_FORMAT_RGB: u32 = 1;
 /// Blue, green, red, as OpenCV has it.
@@ -78,7 +78,7 @@ impl Depth {
 /// The layout and depth of the image called `name`.
 fn format(format: u32, name: &str) -> Result<(Layout, Depth), Failure> {
     let layout = match format % 16 {
-        SKEP_FORMAT_GREY => Some(Layout { channels: 1, rgb: None }),
+        SKEP_FORMAT_GRAY => Some(Layout { channels: 1, rgb: None }),
         SKEP_FORMAT_RGB => Some(Layout { channels: 3, rgb: Some([0, 1, 2]) }),
         SKEP_FORMAT_BGR => Some(Layout { channels: 3, rgb: Some([2, 1, 0]) }),
         SKEP_FORMAT_RGBA => Some(Layout { channels: 4, rgb: Some([0, 1, 2]) }),
@@ -181,14 +181,14 @@ impl skep_image {
         let (width, height) = (self.width, self.height);
         Ok(match layout.rgb {
             None => {
-                let grey: Result<Vec<u8>, Failure> = pixels.map(|pixel| channel(pixel, 0)).collect();
-                Picture::from_grey(width, height, grey?)?
+                let gray: Result<Vec<u8>, Failure> = pixels.map(|pixel| channel(pixel, 0)).collect();
+                Picture::from_gray(width, height, gray?)?
             }
             Some([red, green, blue]) => {
-                let colour: Result<Vec<[u8; 3]>, Failure> = pixels
+                let color: Result<Vec<[u8; 3]>, Failure> = pixels
                     .map(|pixel| Ok([channel(pixel, red)?, channel(pixel, green)?, channel(pixel, blue)?]))
                     .collect();
-                Picture::from_rgb(width, height, colour?)?
+                Picture::from_rgb(width, height, color?)?
             }
         })
     }

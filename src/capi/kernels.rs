@@ -4,22 +4,22 @@ use super::camera::skep_camera;
 use super::image::skep_image;
 use super::pointers::{destroy, get, out, out_slice, slice};
 use super::status::{Failure, guard, skep_status};
-use crate::camera::{Plane, plane_homography};
+use crate::geometry::{Plane, plane_homography};
 use crate::image::PackedImage;
-use crate::kernels::{MAX_COST, PatchHomography, ReferencePatch, Window, patch_cost};
-use crate::simd::{Level, Simd, Task, dispatch};
+use crate::matching::{MAX_COST, PatchHomography, ReferencePatch, Window, patch_cost};
+use crate::simd::{Simd, SimdLevel, Task, dispatch};
 use glam::{DVec2, DVec3, Vec3};
 use std::mem::MaybeUninit;
 
-/// A grey image in the layout the kernels sample. Never changes: may be used from several threads at once.
-pub struct skep_samples {
+/// A gray image in the layout the kernels sample. Never changes: may be used from several threads at once.
+pub struct skep_packed_image {
     image: PackedImage,
 }
 
 /// Where patches are sampled and how samples are weighted. Never changes: may be used from several threads at once.
-pub struct skep_window {
+pub struct skep_ncc_window {
     window: Window,
-    level: Level,
+    level: SimdLevel,
 }
 
 /// A plane in the reference camera's frame: normal . X = -distance, with a unit normal that faces the camera and a
@@ -29,7 +29,7 @@ pub struct skep_window {
 pub struct skep_plane {
     /// Unit normal.
     pub normal: [f64; 3],
-    /// Distance from the camera's centre.
+    /// Distance from the camera's center.
     pub distance: f64,
 }
 
@@ -132,56 +132,56 @@ fn check_item(index: usize, check: impl Fn(&str) -> Result<(), Failure>, list: &
     check("").or_else(|_| check(&format!("{list}[{index}]")))
 }
 
-/// Copies an image into the layout the kernels sample; colours become grey as in skep_scene_add_view.
+/// Copies an image into the layout the kernels sample; colors become gray as in skep_scene_add_view.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_samples_create(
+pub unsafe extern "C" fn skep_packed_image_create(
     image: *const skep_image,
-    samples_out: *mut *mut skep_samples,
+    packed_image_out: *mut *mut skep_packed_image,
 ) -> skep_status {
     guard(|| {
         // SAFETY: as the header demands of the caller.
-        let (image, out) = unsafe { (get(image, "image")?, out(samples_out, "samples_out")?) };
+        let (image, out) = unsafe { (get(image, "image")?, out(packed_image_out, "packed_image_out")?) };
         // SAFETY: as the header demands of the caller.
-        out.give(skep_samples { image: PackedImage::new(&unsafe { image.picture("image") }?) });
+        out.give(skep_packed_image { image: PackedImage::new(&unsafe { image.picture("image") }?) });
         Ok(())
     })
 }
 
 /// Destroys samples; NULL is ignored.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_samples_destroy(samples: *mut skep_samples) {
+pub unsafe extern "C" fn skep_packed_image_destroy(packed_image: *mut skep_packed_image) {
     guard(|| {
         // SAFETY: as the header demands of the caller.
-        unsafe { destroy(samples) };
+        unsafe { destroy(packed_image) };
         Ok(())
     });
 }
 
 /// Makes a square window of half side `radius` (1 to 16), sampled every `step` pixels (1 to 8). A sample weighs
-/// exp(-r^2 / (2 spatial_sigma^2) - dI^2 / (2 colour_sigma^2)), with r its distance from the centre in pixels and dI its
-/// difference in grey from it, of [0, 1]; INFINITY for both sigmas weighs all samples alike. `min_variance`: weighted
-/// variance, of grey in [0, 1], under which a patch has no texture; 1e-5 suits photographs.
+/// exp(-r^2 / (2 sigma_spatial^2) - dI^2 / (2 sigma_color^2)), with r its distance from the center in pixels and dI its
+/// difference in gray from it, of [0, 1]; INFINITY for both sigmas weighs all samples alike. `min_variance`: weighted
+/// variance, of gray in [0, 1], under which a patch has no texture; 1e-5 suits photographs.
 ///
-/// The instruction set is the one skep_backend_name tells when the window is made.
+/// The instruction set is the one skep_simd_level_name tells when the window is made.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_window_create(
+pub unsafe extern "C" fn skep_ncc_window_create(
     radius: u32,
     step: u32,
-    spatial_sigma: f64,
-    colour_sigma: f64,
+    sigma_spatial: f64,
+    sigma_color: f64,
     min_variance: f64,
-    window_out: *mut *mut skep_window,
+    ncc_window_out: *mut *mut skep_ncc_window,
 ) -> skep_status {
     guard(|| {
         // SAFETY: as the header demands of the caller.
-        let out = unsafe { out(window_out, "window_out") }?;
+        let out = unsafe { out(ncc_window_out, "ncc_window_out") }?;
         if !(1..=Window::MAX_RADIUS).contains(&radius) {
             return Err(Failure::argument("radius", radius, format!("1 to {}", Window::MAX_RADIUS)));
         }
         if !(1..=8).contains(&step) {
             return Err(Failure::argument("step", step, "1 to 8"));
         }
-        for (name, sigma) in [("spatial_sigma", spatial_sigma), ("colour_sigma", colour_sigma)] {
+        for (name, sigma) in [("sigma_spatial", sigma_spatial), ("sigma_color", sigma_color)] {
             let usable = sigma >= 1e-3;
             if !usable {
                 return Err(Failure::argument(name, sigma, "a number of at least 0.001, or INFINITY"));
@@ -190,15 +190,15 @@ pub unsafe extern "C" fn skep_window_create(
         if !(0.0..=1.0).contains(&min_variance) {
             return Err(Failure::argument("min_variance", min_variance, "a number from 0 to 1"));
         }
-        let window = Window::new(radius, step, spatial_sigma, colour_sigma, min_variance);
-        out.give(skep_window { window, level: Level::detect() });
+        let window = Window::new(radius, step, sigma_spatial, sigma_color, min_variance);
+        out.give(skep_ncc_window { window, level: SimdLevel::detect() });
         Ok(())
     })
 }
 
 /// Destroys a window; NULL is ignored.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_window_destroy(window: *mut skep_window) {
+pub unsafe extern "C" fn skep_ncc_window_destroy(window: *mut skep_ncc_window) {
     guard(|| {
         // SAFETY: as the header demands of the caller.
         unsafe { destroy(window) };
@@ -206,8 +206,8 @@ pub unsafe extern "C" fn skep_window_destroy(window: *mut skep_window) {
     });
 }
 
-/// Normalised cross-correlations of patches of the reference with their images in a source view: `pixels` holds x, y of
-/// each patch's centre in the reference (2 * count), `homographies` the way of each from reference to source pixels (9
+/// Normalized cross-correlations of patches of the reference with their images in a source view: `pixels` holds x, y of
+/// each patch's center in the reference (2 * count), `homographies` the way of each from reference to source pixels (9
 /// doubles each, row by row), `ncc` has room for count floats. -1 to 1; -1 also where either side has no texture. Samples
 /// outside the reference weigh nothing, those outside the source repeat its border. The source is interpolated bilinearly
 /// at places in 256ths of a pixel, so an NCC differs from the exact one by some 1e-4.
@@ -216,9 +216,9 @@ pub unsafe extern "C" fn skep_window_destroy(window: *mut skep_window) {
 /// threads, no allocation.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_patch_ncc(
-    window: *const skep_window,
-    reference: *const skep_samples,
-    source: *const skep_samples,
+    window: *const skep_ncc_window,
+    reference: *const skep_packed_image,
+    source: *const skep_packed_image,
     pixels: *const u32,
     homographies: *const f64,
     count: usize,
@@ -298,12 +298,12 @@ impl Task for Batch<'_> {
     }
 }
 
-/// A homography about a pixel. Scaled so that the centre's third coordinate is 1, which f32 holds best.
+/// A homography about a pixel. Scaled so that the center's third coordinate is 1, which f32 holds best.
 #[inline(always)]
 fn about_pixel(h: &[f64; 9], x: f64, y: f64) -> PatchHomography {
     let column = |index: usize| DVec3::new(h[index], h[index + 3], h[index + 6]);
-    let centre = column(0) * x + column(1) * y + column(2);
-    let scale = 1.0 / centre.z;
+    let center = column(0) * x + column(1) * y + column(2);
+    let scale = 1.0 / center.z;
     let scaled = |vector: DVec3| -> Vec3 { (vector * scale).as_vec3() };
-    PatchHomography { centre: scaled(centre), along_x: scaled(column(0)), along_y: scaled(column(1)) }
+    PatchHomography { center: scaled(center), along_x: scaled(column(0)), along_y: scaled(column(1)) }
 }

@@ -3,14 +3,13 @@
 //! header. `SKEP_UPDATE_HEADER=1 cargo test layout` writes it anew.
 
 use super::camera::skep_camera;
+use super::estimate::skep_estimate_info;
 use super::fusion::skep_fusion_view;
 use super::image::skep_image;
 use super::kernels::skep_plane;
-use super::options::skep_scale;
 use super::progress::skep_progress;
-use super::result::{skep_cycle, skep_statistics};
-use super::state::skep_state_info;
-use super::steps::skep_step;
+use super::result::{skep_cycle_record, skep_statistics};
+use super::stepper::skep_cycle;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -44,18 +43,17 @@ macro_rules! layout {
 }
 
 layout! {
-    skep_scale { halvings, foods, first_iterations, cycles, cycle_iterations }
     skep_image { data, width, height, stride_bytes, format }
     skep_camera { fx, fy, cx, cy, rotation, translation }
-    skep_progress { done, phase, reduction, cycle, view, view_count }
-    skep_statistics { ncc_evaluations, samples, early_outs, pixels }
-    skep_cycle { reduction, cycle, pixels, changed, validated }
+    skep_progress { done, phase, downscale, cycle, view, view_count }
+    skep_statistics { ncc_evaluations, bilinear_samples, early_terminations, status_counts }
+    skep_cycle_record { downscale, cycle, pixels, changed, validated }
     skep_fusion_view {
         camera, width, height, depth, depth_stride_bytes, normal, normal_stride_bytes, image_or_null, overlap,
         overlap_count
     }
-    skep_step { reduction, cycle, foods, iterations }
-    skep_state_info { view, step, is_checked, reserved, pixels, changed, validated, ncc_evaluations }
+    skep_cycle { downscale, cycle_on_scale, food_sources, iterations }
+    skep_estimate_info { view, cycle, is_checked, reserved, pixels, changed, validated, ncc_evaluations }
     skep_plane { normal, distance }
 }
 

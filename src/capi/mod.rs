@@ -11,6 +11,7 @@
 mod borrow;
 mod camera;
 mod cloud;
+mod estimate;
 mod files;
 mod fusion;
 mod image;
@@ -23,6 +24,5 @@ mod pointers;
 mod progress;
 mod result;
 mod scene;
-mod state;
 mod status;
-mod steps;
+mod stepper;

@@ -1,6 +1,6 @@
 //! From C's pointers to references, with everything checked that can be.
 
-use super::status::{Failure, SKEP_ERR_CAPACITY, SKEP_ERR_NULL, SKEP_ERR_STATE};
+use super::status::{Failure, SKEP_ERR_CAPACITY, SKEP_ERR_NULL, SKEP_ERR_POISONED};
 use std::ffi::{CStr, OsStr, c_char};
 use std::path::Path;
 use std::sync::{RwLock, RwLockReadGuard, RwLockWriteGuard};
@@ -231,5 +231,5 @@ pub fn write<T>(lock: &RwLock<T>) -> Result<RwLockWriteGuard<'_, T>, Failure> {
 }
 
 fn poisoned() -> Failure {
-    Failure::new(SKEP_ERR_STATE, "an earlier call that was changing this object panicked; destroy it")
+    Failure::new(SKEP_ERR_POISONED, "an earlier call that was changing this object panicked; destroy it")
 }

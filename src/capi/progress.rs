@@ -1,6 +1,6 @@
 //! How C follows a run and stops it.
 
-use crate::progress::{Phase, Progress};
+use crate::pipeline::{Phase, Progress};
 use std::ffi::c_void;
 use std::ops::ControlFlow;
 use std::sync::Mutex;
@@ -23,7 +23,7 @@ pub struct skep_progress {
     /// What is being done: a SKEP_PHASE_ value.
     pub phase: u32,
     /// Size of the images searched: 1 is full, 2 half, 4 a quarter.
-    pub reduction: u32,
+    pub downscale: u32,
     /// The cycle on this scale, counted from 0.
     pub cycle: u32,
     /// The view at work.
@@ -74,7 +74,7 @@ impl Host {
                     Phase::Check => SKEP_PHASE_CHECK,
                     Phase::Fusion => SKEP_PHASE_FUSION,
                 },
-                reduction: at.reduction,
+                downscale: at.downscale,
                 cycle: at.cycle,
                 view: at.view as u32,
                 view_count: at.views as u32,

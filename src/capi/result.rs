@@ -7,8 +7,10 @@ use super::pointers::{destroy, get, give_list, out};
 use super::progress::{Host, skep_progress_fn};
 use super::scene::{give_text, skep_scene};
 use super::status::{Failure, guard, skep_status};
-use crate::maps::{Outcome, PointCloud, ViewResult};
-use crate::solve::reconstruct;
+use crate::fusion::PointCloud;
+use crate::pipeline::ViewResult;
+use crate::pipeline::reconstruct;
+use crate::scene::PixelStatus;
 use std::collections::BTreeMap;
 use std::ffi::{c_char, c_void};
 use std::sync::Arc;
@@ -47,19 +49,19 @@ pub struct skep_statistics {
     /// Patches compared with a patch in one source view.
     pub ncc_evaluations: u64,
     /// Bilinear samples taken from source views.
-    pub samples: u64,
+    pub bilinear_samples: u64,
     /// Hypotheses given up before all their source views were looked at.
-    pub early_outs: u64,
+    pub early_terminations: u64,
     /// Number of pixels of each SKEP_PIXEL_ value; those beyond the last are 0.
-    pub pixels: [u64; 8],
+    pub status_counts: [u64; 8],
 }
 
 /// One cycle's search of one view.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
-pub struct skep_cycle {
+pub struct skep_cycle_record {
     /// Size of the images: 1 is full, 2 half, 4 a quarter.
-    pub reduction: u32,
+    pub downscale: u32,
     /// The cycle on that scale, counted from 0.
     pub cycle: u32,
     /// Pixels searched.
@@ -70,10 +72,10 @@ pub struct skep_cycle {
     pub validated: u64,
 }
 
-impl skep_cycle {
-    pub fn of(record: &crate::CycleRecord) -> skep_cycle {
-        let crate::CycleRecord { reduction, cycle, pixels, changed, validated } = *record;
-        skep_cycle { reduction, cycle, pixels, changed, validated }
+impl skep_cycle_record {
+    pub fn of(record: &crate::CycleRecord) -> skep_cycle_record {
+        let crate::CycleRecord { downscale, cycle, pixels, changed, validated } = *record;
+        skep_cycle_record { downscale, cycle, pixels, changed, validated }
     }
 }
 
@@ -237,7 +239,7 @@ fn check_which(which: u32) -> Result<(), Failure> {
 
 /// Whether a pixel's estimate is handed out.
 fn is_given(view: &ViewResult, pixel: usize, which: u32) -> bool {
-    which == SKEP_MAPS_RAW || view.outcome[pixel] == Outcome::Validated
+    which == SKEP_MAPS_RAW || view.status[pixel] == PixelStatus::Validated
 }
 
 /// Copies a view's depth map: width floats a row, height rows, `stride_bytes` from row to row (at least 4 * width).
@@ -292,14 +294,14 @@ pub unsafe extern "C" fn skep_result_get_cost(
 
 /// Copies what became of every pixel, a SKEP_PIXEL_ value each: the reason where there is no validated depth.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_result_get_outcome(
+pub unsafe extern "C" fn skep_result_get_status(
     result: *const skep_result,
     view: u32,
     out: *mut u8,
     stride_bytes: usize,
 ) -> skep_status {
     // SAFETY: as the header demands of the caller.
-    unsafe { give_map(result, view, out, stride_bytes, |_| Ok(()), |view, pixel| view.outcome[pixel] as u8) }
+    unsafe { give_map(result, view, out, stride_bytes, |_| Ok(()), |view, pixel| view.status[pixel] as u8) }
 }
 
 /// Copies the number of source views of every pixel; `stride_bytes` is at least 2 * width.
@@ -383,10 +385,10 @@ pub unsafe extern "C" fn skep_result_get_statistics(
         // SAFETY: as the header demands of the caller.
         let (result, out) = unsafe { (get(result, "result")?, out(statistics_out, "statistics_out")?) };
         let view = result.view(view)?;
-        let mut pixels = [0; 8];
-        pixels.iter_mut().zip(view.outcome_counts()).for_each(|(place, count)| *place = count);
-        let crate::Counts { ncc_evaluations, samples, early_outs } = view.counts;
-        out.set(skep_statistics { ncc_evaluations, samples, early_outs, pixels });
+        let mut status_counts = [0; 8];
+        status_counts.iter_mut().zip(view.status_counts()).for_each(|(place, count)| *place = count);
+        let crate::Counts { ncc_evaluations, bilinear_samples, early_terminations } = view.counts;
+        out.set(skep_statistics { ncc_evaluations, bilinear_samples, early_terminations, status_counts });
         Ok(())
     })
 }
@@ -396,14 +398,15 @@ pub unsafe extern "C" fn skep_result_get_statistics(
 pub unsafe extern "C" fn skep_result_get_cycles(
     result: *const skep_result,
     view: u32,
-    cycles: *mut skep_cycle,
+    cycles: *mut skep_cycle_record,
     capacity: usize,
     count_out: *mut usize,
 ) -> skep_status {
     guard(|| {
         // SAFETY: as the header demands of the caller.
         let result = unsafe { get(result, "result") }?;
-        let list: Vec<skep_cycle> = result.view(view)?.cycles.iter().map(skep_cycle::of).collect();
+        let list: Vec<skep_cycle_record> =
+            result.view(view)?.cycles.iter().map(skep_cycle_record::of).collect();
         // SAFETY: as the header demands of the caller.
         unsafe { give_list(&list, cycles, capacity, count_out, ("cycles", "count_out")) }
     })
@@ -411,11 +414,11 @@ pub unsafe extern "C" fn skep_result_get_cycles(
 
 // The values C sees are the outcomes' own.
 const _: () = {
-    assert!(SKEP_PIXEL_VALIDATED == Outcome::Validated as u8);
-    assert!(SKEP_PIXEL_MASKED == Outcome::Masked as u8);
-    assert!(SKEP_PIXEL_NO_TEXTURE == Outcome::NoTexture as u8);
-    assert!(SKEP_PIXEL_NO_SOURCES == Outcome::NoSources as u8);
-    assert!(SKEP_PIXEL_INCONSISTENT == Outcome::Inconsistent as u8);
-    assert!(SKEP_PIXEL_OUT_OF_RANGE == Outcome::OutOfRange as u8);
-    assert!(Outcome::ALL.len() <= 8);
+    assert!(SKEP_PIXEL_VALIDATED == PixelStatus::Validated as u8);
+    assert!(SKEP_PIXEL_MASKED == PixelStatus::Masked as u8);
+    assert!(SKEP_PIXEL_NO_TEXTURE == PixelStatus::NoTexture as u8);
+    assert!(SKEP_PIXEL_NO_SOURCES == PixelStatus::NoSources as u8);
+    assert!(SKEP_PIXEL_INCONSISTENT == PixelStatus::Inconsistent as u8);
+    assert!(SKEP_PIXEL_OUT_OF_RANGE == PixelStatus::OutOfRange as u8);
+    assert!(PixelStatus::ALL.len() <= 8);
 };

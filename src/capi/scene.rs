@@ -6,8 +6,9 @@ use super::maps;
 use super::options::{options_or_default, skep_options};
 use super::pointers::{self, copy_text, destroy, get, give_list, out, slice, text, wanted_one};
 use super::status::{Failure, guard, skep_status};
-use crate::scene::{DepthRange, Scene, SparsePoint, View};
-use crate::{fusion, views};
+use crate::geometry::DepthRange;
+use crate::scene::{Scene, SparsePoint, View};
+use crate::{fusion, view_selection};
 use glam::DVec3;
 use std::ffi::c_char;
 use std::sync::RwLock;
@@ -75,7 +76,7 @@ pub unsafe extern "C" fn skep_scene_destroy(scene: *mut skep_scene) {
     });
 }
 
-/// Adds a photograph, copied, rounded to 8 bits a channel; grey is the luma of colours (ITU-R BT.601). `name_or_null`
+/// Adds a photograph, copied, rounded to 8 bits a channel; gray is the luma of colors (ITU-R BT.601). `name_or_null`
 /// (UTF-8, copied) names it in messages and files; NULL names it "view0000.png" by its number. Views are numbered in the
 /// order they are added; `view_out`, which may be NULL, receives the number.
 #[unsafe(no_mangle)]
@@ -360,7 +361,7 @@ pub unsafe extern "C" fn skep_scene_get_sources(
         let (scene, options) =
             unsafe { (get(scene, "scene")?.checked()?, options_or_default(options_or_null)?) };
         options.check()?;
-        let lists = views::source_lists(&scene, &options).lists;
+        let lists = view_selection::source_lists(&scene, &options).lists;
         let list = lists.get(view as usize).ok_or_else(|| no_view(view, lists.len()))?;
         // SAFETY: as the header demands of the caller.
         unsafe { give_list(list, sources, capacity, count_out, ("sources", "count_out")) }
@@ -409,7 +410,7 @@ pub unsafe extern "C" fn skep_scene_get_triangulation_angle(
         if reference == source {
             return Err(Failure::argument("source", source, "another view than the reference"));
         }
-        let angle = views::triangulation_angle(&scene, reference as usize, source as usize);
+        let angle = view_selection::triangulation_angle(&scene, reference as usize, source as usize);
         out.set(angle.unwrap_or(-1.0));
         Ok(())
     })

@@ -2,7 +2,7 @@
 
 use super::pointers::copy_text;
 use crate::error::Error;
-use crate::simd::Level;
+use crate::simd::SimdLevel;
 use std::cell::RefCell;
 use std::ffi::{CStr, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -20,7 +20,7 @@ pub const SKEP_ERR_NULL: i32 = -1;
 /// A value cannot be used: out of range, not a number, of the wrong size, unknown, or in the wrong order.
 pub const SKEP_ERR_ARGUMENT: i32 = -2;
 /// The object cannot be used any more: a call that was changing it panicked. Destroy it.
-pub const SKEP_ERR_STATE: i32 = -3;
+pub const SKEP_ERR_POISONED: i32 = -3;
 /// The progress callback asked to stop.
 pub const SKEP_ERR_CANCELLED: i32 = -4;
 /// A file cannot be read, understood or written.
@@ -58,14 +58,14 @@ impl From<Error> for Failure {
 }
 
 /// Result of the inside of an entry.
-pub type Outcome = Result<(), Failure>;
+pub type Status = Result<(), Failure>;
 
 thread_local! {
     static LAST_ERROR: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
-/// Runs the inside of an entry. A panic ends here: unwinding into C would be undefined behaviour.
-pub fn guard(entry: impl FnOnce() -> Outcome) -> skep_status {
+/// Runs the inside of an entry. A panic ends here: unwinding into C would be undefined behavior.
+pub fn guard(entry: impl FnOnce() -> Status) -> skep_status {
     let failure = match catch_unwind(AssertUnwindSafe(entry)) {
         Ok(Ok(())) => return SKEP_OK,
         Ok(Err(failure)) => failure,
@@ -94,14 +94,14 @@ pub extern "C" fn skep_version() -> *const c_char {
     VERSION.as_ptr().cast()
 }
 
-/// The instruction set that runs are made on unless an option says otherwise: "scalar", "base" or "v3" (AVX2); static.
+/// The instruction set that runs are made on unless an option says otherwise: "scalar", "baseline" or "v3" (AVX2); static.
 /// The environment variable SKEP_SIMD forces one of them, lowered to what the machine has. Results do not depend on it.
 #[unsafe(no_mangle)]
-pub extern "C" fn skep_backend_name() -> *const c_char {
-    let name: &CStr = match Level::detect() {
-        Level::Scalar => c"scalar",
-        Level::Base => c"base",
-        Level::X86V3 => c"v3",
+pub extern "C" fn skep_simd_level_name() -> *const c_char {
+    let name: &CStr = match SimdLevel::detect() {
+        SimdLevel::Scalar => c"scalar",
+        SimdLevel::Baseline => c"baseline",
+        SimdLevel::X86V3 => c"v3",
     };
     name.as_ptr()
 }
@@ -113,7 +113,7 @@ pub extern "C" fn skep_status_name(status: skep_status) -> *const c_char {
         SKEP_OK => c"ok",
         SKEP_ERR_NULL => c"null",
         SKEP_ERR_ARGUMENT => c"argument",
-        SKEP_ERR_STATE => c"state",
+        SKEP_ERR_POISONED => c"state",
         SKEP_ERR_CANCELLED => c"cancelled",
         SKEP_ERR_FILE => c"file",
         SKEP_ERR_CAPACITY => c"capacity",

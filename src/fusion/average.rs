@@ -20,38 +20,38 @@ pub(super) struct Member {
 /// errors) are left out: depths that agree within a percent may still be worse than what they would be averaged with.
 const MAX_DEVIATIONS: f64 = 3.0;
 
-/// Colour of points no picture sees.
-const GREY: [u8; 3] = [128; 3];
+/// Color of points no picture sees.
+const GRAY: [u8; 3] = [128; 3];
 
-/// Weighted means of position, normal (unit) and colour over the members that lie closest together; the first is the
-/// one the point started from. `colour` is `None` for members without a picture.
+/// Weighted means of position, normal (unit) and color over the members that lie closest together; the first is the
+/// one the point started from. `color` is `None` for members without a picture.
 pub(super) fn average(
     members: &[Member],
-    colour: impl Fn(&Member) -> Option<[u8; 3]>,
+    color: impl Fn(&Member) -> Option<[u8; 3]>,
 ) -> (DVec3, DVec3, [u8; 3]) {
     let start = &members[0];
-    // Along the normal only: a pixel's centre lies anywhere within half a pixel of the point.
+    // Along the normal only: a pixel's center lies anywhere within half a pixel of the point.
     let height = |member: &Member| (member.position - start.position).dot(start.normal);
     let middle = median(members.iter().map(height).collect());
     let deviation = |member: &Member| (height(member) - middle).abs();
     let limit = MAX_DEVIATIONS * median(members.iter().map(deviation).collect());
 
     let (mut offset, mut normal, mut weight) = (DVec3::ZERO, DVec3::ZERO, 0.0);
-    let (mut colours, mut colour_weight) = (DVec3::ZERO, 0.0);
+    let (mut colors, mut color_weight) = (DVec3::ZERO, 0.0);
     for member in members.iter().filter(|member| deviation(member) <= limit) {
         offset += (member.position - start.position) * member.weight;
         normal += member.normal * member.weight;
         weight += member.weight;
-        if let Some(colour) = colour(member) {
-            colours += DVec3::from_array(colour.map(f64::from)) * member.weight;
-            colour_weight += member.weight;
+        if let Some(color) = color(member) {
+            colors += DVec3::from_array(color.map(f64::from)) * member.weight;
+            color_weight += member.weight;
         }
     }
-    let colour = match colour_weight > 0.0 {
-        true => (colours / colour_weight).round().to_array().map(|channel| channel as u8),
-        false => GREY,
+    let color = match color_weight > 0.0 {
+        true => (colors / color_weight).round().to_array().map(|channel| channel as u8),
+        false => GRAY,
     };
-    (start.position + offset / weight, normal.try_normalize().unwrap_or(start.normal), colour)
+    (start.position + offset / weight, normal.try_normalize().unwrap_or(start.normal), color)
 }
 
 /// The middle value, or the mean of the two in the middle. At least one value.
@@ -80,18 +80,18 @@ mod tests {
     fn closer_views_weigh_more() {
         let mut members = [0.0, 1.0].map(member);
         members[1].weight = 3.0;
-        let (position, _, colour) =
+        let (position, _, color) =
             average(&members, |member| Some([if member.weight > 1.0 { 200 } else { 100 }; 3]));
         assert_eq!(position.z, 0.75);
-        assert_eq!(colour, [175; 3]);
+        assert_eq!(color, [175; 3]);
     }
 
     #[test]
-    fn members_without_pictures_do_not_darken_the_colour() {
+    fn members_without_pictures_do_not_darken_the_color() {
         let mut members = [0.0, 0.0].map(member);
         members[1].view = 1;
-        let colour = |member: &Member| (member.view == 0).then_some([10, 20, 30]);
-        assert_eq!(average(&members, colour).2, [10, 20, 30]);
-        assert_eq!(average(&members, |_| None).2, GREY);
+        let color = |member: &Member| (member.view == 0).then_some([10, 20, 30]);
+        assert_eq!(average(&members, color).2, [10, 20, 30]);
+        assert_eq!(average(&members, |_| None).2, GRAY);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::average::Member;
 use super::{FusionView, estimate, weight};
-use crate::camera::Camera;
+use crate::geometry::Camera;
 use crate::options::FusionOptions;
 use glam::{DMat3, DVec2, DVec3};
 
@@ -28,8 +28,8 @@ pub(super) struct Source<'a> {
     shift: DVec3,
     /// Camera directions to the world.
     to_world: DMat3,
-    /// The camera's centre from the reference's.
-    centre: DVec3,
+    /// The camera's center from the reference's.
+    center: DVec3,
     depth_tolerance: f64,
     min_cosine: f64,
 }
@@ -42,15 +42,15 @@ impl<'a> Source<'a> {
         options: &FusionOptions,
     ) -> Source<'a> {
         let camera = view.camera;
-        let centre = camera.centre() - reference.centre();
+        let center = camera.center() - reference.center();
         let rotation = camera.rotation * reference.rotation.transpose();
         Source {
             index,
             view,
             transfer: camera.calibration() * rotation * reference.calibration().inverse(),
-            shift: camera.calibration() * (camera.rotation * -centre),
+            shift: camera.calibration() * (camera.rotation * -center),
             to_world: camera.rotation.transpose(),
-            centre,
+            center,
             depth_tolerance: options.depth_tolerance,
             min_cosine: options.normal_tolerance.to_radians().cos(),
         }
@@ -77,7 +77,7 @@ impl<'a> Source<'a> {
             return Opinion::None;
         }
         let ray = camera.ray(DVec2::new(f64::from(column), f64::from(row)));
-        let position = self.centre + self.to_world * (ray * depth);
+        let position = self.center + self.to_world * (ray * depth);
         Opinion::Agrees(Member { view: self.index, pixel, position, normal, weight: weight(camera, depth) })
     }
 }

@@ -1,11 +1,13 @@
-//! Images as the solver sees them: grey bytes, their pyramid and the packed layout the kernels sample.
+//! Images as the solver sees them: gray bytes, their pyramid and the packed layout the kernels sample.
 
+mod blur;
 mod noise;
-mod packed;
+mod packed_image;
 mod picture;
 mod pyramid;
 
+pub(crate) use blur::{blurred, deviation};
 pub use noise::Noise;
-pub use packed::PackedImage;
+pub use packed_image::PackedImage;
 pub use picture::Picture;
-pub use pyramid::ScaledView;
+pub(crate) use pyramid::halve_mask;

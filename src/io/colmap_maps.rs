@@ -2,7 +2,7 @@
 
 use super::files::{FileReader, write_file};
 use crate::error::{Error, Result};
-use crate::maps::PointViews;
+use crate::fusion::PointViews;
 use std::io::{self, Write};
 use std::path::Path;
 

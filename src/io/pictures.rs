@@ -1,8 +1,8 @@
 //! Photographs from PNG and JPEG files, and to PNG files.
 
 use super::files::{cannot_be_read, write_file};
-use crate::camera::Camera;
 use crate::error::Result;
+use crate::geometry::Camera;
 use crate::image::Picture;
 use image::codecs::png::PngEncoder;
 use image::{ColorType, DynamicImage, ExtendedColorType, ImageEncoder, ImageReader, Limits};
@@ -10,13 +10,13 @@ use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::Path;
 
-/// Reads a PNG or JPEG file, colour or grey, 8 or 16 bits (16 are rounded to 8). An alpha channel is dropped; nothing
-/// else is applied, neither an orientation nor a colour profile: the calibration speaks of the stored pixels.
+/// Reads a PNG or JPEG file, color or gray, 8 or 16 bits (16 are rounded to 8). An alpha channel is dropped; nothing
+/// else is applied, neither an orientation nor a color profile: the calibration speaks of the stored pixels.
 pub fn read_picture(path: &Path) -> Result<Picture> {
     let image = open(path)?.decode().map_err(|error| cannot_be_read(path, error))?;
     let (width, height) = (image.width(), image.height());
-    if is_grey(&image) {
-        return Picture::from_grey(width, height, image.into_luma8().into_raw());
+    if is_gray(&image) {
+        return Picture::from_gray(width, height, image.into_luma8().into_raw());
     }
     Picture::from_rgb(width, height, image.into_rgb8().pixels().map(|pixel| pixel.0).collect())
 }
@@ -26,19 +26,19 @@ pub fn picture_size(path: &Path) -> Result<(u32, u32)> {
     open(path)?.into_dimensions().map_err(|error| cannot_be_read(path, error))
 }
 
-/// Writes a picture as PNG, in colour when it has colours.
+/// Writes a picture as PNG, in color when it has colors.
 pub fn write_picture(path: &Path, picture: &Picture) -> Result<()> {
-    let (bytes, colour) = match picture.colour() {
-        Some(colour) => (colour.as_flattened(), ExtendedColorType::Rgb8),
-        None => (picture.grey(), ExtendedColorType::L8),
+    let (bytes, color) = match picture.color() {
+        Some(color) => (color.as_flattened(), ExtendedColorType::Rgb8),
+        None => (picture.gray(), ExtendedColorType::L8),
     };
     write_file(path, |out| {
         let encoder = PngEncoder::new(out);
-        encoder.write_image(bytes, picture.width(), picture.height(), colour).map_err(io::Error::other)
+        encoder.write_image(bytes, picture.width(), picture.height(), color).map_err(io::Error::other)
     })
 }
 
-fn is_grey(image: &DynamicImage) -> bool {
+fn is_gray(image: &DynamicImage) -> bool {
     matches!(image.color(), ColorType::L8 | ColorType::La8 | ColorType::L16 | ColorType::La16)
 }
 

@@ -2,7 +2,7 @@
 
 use super::files::{FileReader, cannot_be_read, write_file};
 use crate::error::{Error, Result};
-use crate::maps::{PointCloud, PointViews};
+use crate::fusion::{PointCloud, PointViews};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{
     ElementDef, Encoding, Header, PropertyAccess, PropertyAccessResult, PropertyDef, PropertyType, ScalarType,
@@ -21,7 +21,7 @@ const BYTES: [&str; 3] = ["red", "green", "blue"];
 struct Vertex {
     /// Position, then normal.
     floats: [f32; 6],
-    colour: [u8; 3],
+    color: [u8; 3],
 }
 
 impl PropertyAccess for Vertex {
@@ -34,7 +34,7 @@ impl PropertyAccess for Vertex {
     }
 
     fn get_uchar(&self, name: &str) -> Option<u8> {
-        place(&BYTES, name).map(|index| self.colour[index])
+        place(&BYTES, name).map(|index| self.color[index])
     }
 
     fn set_float(&mut self, name: &str, value: f32) -> PropertyAccessResult {
@@ -42,7 +42,7 @@ impl PropertyAccess for Vertex {
     }
 
     fn set_uchar(&mut self, name: &str, value: u8) -> PropertyAccessResult {
-        set(place(&BYTES, name).map(|index| &mut self.colour[index]), value)
+        set(place(&BYTES, name).map(|index| &mut self.color[index]), value)
     }
 }
 
@@ -74,10 +74,10 @@ fn header(points: usize) -> Header {
     header
 }
 
-/// Writes positions (as f32, which is all the layout has), normals and colours, binary little-endian.
+/// Writes positions (as f32, which is all the layout has), normals and colors, binary little-endian.
 pub fn write_ply(path: &Path, cloud: &PointCloud) -> Result<()> {
     let points = cloud.positions.len();
-    for (name, length) in [("cloud.normals", cloud.normals.len()), ("cloud.colours", cloud.colours.len())] {
+    for (name, length) in [("cloud.normals", cloud.normals.len()), ("cloud.colors", cloud.colors.len())] {
         if length != points {
             return Err(Error::argument(
                 name,
@@ -91,10 +91,10 @@ pub fn write_ply(path: &Path, cloud: &PointCloud) -> Result<()> {
     let writer = Writer::<Vertex>::new();
     write_file(path, |out| {
         writer.write_header(out, &header)?;
-        for ((position, normal), colour) in cloud.positions.iter().zip(&cloud.normals).zip(&cloud.colours) {
+        for ((position, normal), color) in cloud.positions.iter().zip(&cloud.normals).zip(&cloud.colors) {
             let [x, y, z] = position.map(|coordinate| coordinate as f32);
             let [nx, ny, nz] = *normal;
-            let vertex = Vertex { floats: [x, y, z, nx, ny, nz], colour: *colour };
+            let vertex = Vertex { floats: [x, y, z, nx, ny, nz], color: *color };
             writer.write_little_endian_element(out, &vertex, definition)?;
         }
         Ok(())
@@ -127,10 +127,10 @@ pub fn read_ply(path: &Path) -> Result<PointCloud> {
         return Err(Error::file(path, format!("goes on after its {count} points")));
     }
     let mut cloud = PointCloud::default();
-    for Vertex { floats: [x, y, z, nx, ny, nz], colour } in vertices {
+    for Vertex { floats: [x, y, z, nx, ny, nz], color } in vertices {
         cloud.positions.push([x.into(), y.into(), z.into()]);
         cloud.normals.push([nx, ny, nz]);
-        cloud.colours.push(colour);
+        cloud.colors.push(color);
     }
     Ok(cloud)
 }

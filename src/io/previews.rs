@@ -9,7 +9,7 @@ use std::io;
 use std::path::Path;
 
 /// Far to near, of even steps in lightness.
-const COLOURS: [[f32; 3]; 6] = [
+const COLORS: [[f32; 3]; 6] = [
     [48.0, 18.0, 94.0],
     [58.0, 64.0, 158.0],
     [26.0, 118.0, 172.0],
@@ -17,10 +17,10 @@ const COLOURS: [[f32; 3]; 6] = [
     [134.0, 206.0, 72.0],
     [252.0, 236.0, 84.0],
 ];
-/// Percentiles of the inverse depths between which the colours spread.
+/// Percentiles of the inverse depths between which the colors spread.
 const SPREAD: (f64, f64) = (0.02, 0.98);
 
-/// Writes depths as colours over inverse depth: near is bright.
+/// Writes depths as colors over inverse depth: near is bright.
 pub fn write_depth_preview(path: &Path, width: u32, height: u32, depth: &[f32]) -> Result<()> {
     check_length("depth map", width, height, depth.len())?;
     let mut inverse: Vec<f32> = depth.iter().filter(|depth| **depth > 0.0).map(|depth| 1.0 / depth).collect();
@@ -32,23 +32,23 @@ pub fn write_depth_preview(path: &Path, width: u32, height: u32, depth: &[f32]) 
     let (far, near) = (percentile(SPREAD.0), percentile(SPREAD.1));
     let scale = 1.0 / (near - far).max(f32::MIN_POSITIVE);
     write_rgb(path, width, height, |pixel| match depth[pixel] {
-        depth if depth > 0.0 => colour((1.0 / depth - far) * scale),
+        depth if depth > 0.0 => color((1.0 / depth - far) * scale),
         _ => [0; 3],
     })
 }
 
-/// The colour at a share of the way from far to near, linear between the table's.
-fn colour(share: f32) -> [u8; 3] {
-    let place = share.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f32;
-    let index = (place as usize).min(COLOURS.len() - 2);
+/// The color at a share of the way from far to near, linear between the table's.
+fn color(share: f32) -> [u8; 3] {
+    let place = share.clamp(0.0, 1.0) * (COLORS.len() - 1) as f32;
+    let index = (place as usize).min(COLORS.len() - 2);
     let part = place - index as f32;
     std::array::from_fn(|channel| {
-        let (from, to) = (COLOURS[index][channel], COLOURS[index + 1][channel]);
+        let (from, to) = (COLORS[index][channel], COLORS[index + 1][channel]);
         (from + (to - from) * part).round() as u8
     })
 }
 
-/// Writes normals as colours: right is red, up is green, towards the camera is blue.
+/// Writes normals as colors: right is red, up is green, towards the camera is blue.
 pub fn write_normal_preview(path: &Path, width: u32, height: u32, normal: &[[f32; 3]]) -> Result<()> {
     check_length("normal map", width, height, normal.len())?;
     let byte = |component: f32| ((component * 0.5 + 0.5) * 255.0).round() as u8;
@@ -73,8 +73,8 @@ pub fn write_views_preview(
     write_png(path, width, height, &bytes, ExtendedColorType::L8)
 }
 
-fn write_rgb(path: &Path, width: u32, height: u32, colour: impl Fn(usize) -> [u8; 3]) -> Result<()> {
-    let bytes: Vec<[u8; 3]> = (0..width as usize * height as usize).map(colour).collect();
+fn write_rgb(path: &Path, width: u32, height: u32, color: impl Fn(usize) -> [u8; 3]) -> Result<()> {
+    let bytes: Vec<[u8; 3]> = (0..width as usize * height as usize).map(color).collect();
     write_png(path, width, height, bytes.as_flattened(), ExtendedColorType::Rgb8)
 }
 
@@ -86,12 +86,12 @@ fn write_png(path: &Path, width: u32, height: u32, bytes: &[u8], kind: ExtendedC
 
 #[cfg(test)]
 mod tests {
-    use super::colour;
+    use super::color;
 
     #[test]
-    fn nearer_is_lighter_all_along_the_colours() {
+    fn nearer_is_lighter_all_along_the_colors() {
         let luma = |share: f32| {
-            let [r, g, b] = colour(share).map(f32::from);
+            let [r, g, b] = color(share).map(f32::from);
             0.299 * r + 0.587 * g + 0.114 * b
         };
         let steps: Vec<f32> = (0..=50).map(|step| luma(step as f32 / 50.0)).collect();

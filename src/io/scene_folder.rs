@@ -3,10 +3,11 @@
 use super::colmap_model::ColmapModel;
 use super::files::{NAME_INSIDE, stays_inside};
 use super::pictures::{picture_size, read_picture, write_picture};
-use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::geometry::Camera;
+use crate::geometry::DepthRange;
 use crate::image::Picture;
-use crate::scene::{DepthRange, Scene, View};
+use crate::scene::{Scene, View};
 use std::path::{Path, PathBuf};
 
 /// Where a scene's photographs and model lie.

@@ -8,10 +8,12 @@ use super::files::{NAME_INSIDE, cannot_be_read, copy_file, link_or_copy, stays_i
 use super::ply::{write_ply, write_visibility};
 use super::previews::{write_depth_preview, write_normal_preview, write_views_preview};
 use super::scene_folder::SceneFolder;
-use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::fusion::PointCloud;
+use crate::geometry::Camera;
 use crate::image::Picture;
-use crate::maps::{Maps, PointCloud, ViewResult};
+use crate::pipeline::ViewResult;
+use crate::scene::Maps;
 use crate::scene::SparsePoint;
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
 //! One lane at a time: what the other back-ends are tested against.
 
-use super::{LANES, Level, Simd, Taps};
+use super::{LANES, Simd, SimdLevel, Taps};
 use std::array::from_fn;
 
 /// The scalar back-end.
@@ -9,16 +9,16 @@ pub struct Scalar;
 
 /// Places in an image, in 256ths of a pixel.
 #[derive(Debug, Clone, Copy)]
-pub struct Aimed<'a> {
+pub struct SamplePositions<'a> {
     image: &'a Taps,
     x: [u32; LANES],
     y: [u32; LANES],
 }
 
 impl Simd for Scalar {
-    const LEVEL: Level = Level::Scalar;
+    const LEVEL: SimdLevel = SimdLevel::Scalar;
     type F32 = [f32; LANES];
-    type Aimed<'a> = Aimed<'a>;
+    type SamplePositions<'a> = SamplePositions<'a>;
 
     #[inline(always)]
     fn splat(self, value: f32) -> Self::F32 {
@@ -66,7 +66,7 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
-    fn at_least(self, a: Self::F32, b: Self::F32) -> u8 {
+    fn simd_ge(self, a: Self::F32, b: Self::F32) -> u8 {
         (0..LANES).fold(0, |bits, lane| bits | u8::from(a[lane] >= b[lane]) << lane)
     }
 
@@ -76,25 +76,25 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
-    fn whole(self, a: Self::F32) -> Self::F32 {
+    fn trunc(self, a: Self::F32) -> Self::F32 {
         from_fn(|lane| a[lane] as i32 as f32)
     }
 
     #[inline(always)]
-    fn places(self, strides: &[i32; LANES], x: Self::F32, y: Self::F32) -> [u32; LANES] {
+    fn linear_indices(self, strides: &[i32; LANES], x: Self::F32, y: Self::F32) -> [u32; LANES] {
         from_fn(|lane| (y[lane] as i32).wrapping_mul(strides[lane]).wrapping_add(x[lane] as i32) as u32)
     }
 
     #[inline(always)]
-    fn aim<'a>(self, image: &'a Taps, x: Self::F32, y: Self::F32) -> Aimed<'a> {
+    fn sample_positions<'a>(self, image: &'a Taps, x: Self::F32, y: Self::F32) -> SamplePositions<'a> {
         let (right, bottom) = image.last();
         let x = self.min(self.max(x, [0.0; LANES]), [right; LANES]);
         let y = self.min(self.max(y, [0.0; LANES]), [bottom; LANES]);
-        Aimed { image, x: x.map(|x| x as u32), y: y.map(|y| y as u32) }
+        SamplePositions { image, x: x.map(|x| x as u32), y: y.map(|y| y as u32) }
     }
 
     #[inline(always)]
-    fn read(self, Aimed { image, x, y }: Aimed) -> Self::F32 {
+    fn sample_bilinear(self, SamplePositions { image, x, y }: SamplePositions) -> Self::F32 {
         from_fn(|lane| {
             let (x, y) = (x[lane], y[lane]);
             let index = (y >> 8) as usize * image.stride() + (x >> 8) as usize;
@@ -117,12 +117,12 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
-    fn sum(self, l: Self::F32) -> f32 {
+    fn reduce_sum(self, l: Self::F32) -> f32 {
         ((l[0] + l[4]) + (l[2] + l[6])) + ((l[1] + l[5]) + (l[3] + l[7]))
     }
 
     #[inline(always)]
-    fn largest(self, a: Self::F32) -> f32 {
+    fn reduce_max(self, a: Self::F32) -> f32 {
         a.into_iter().fold(f32::NEG_INFINITY, |most, lane| if lane > most { lane } else { most })
     }
 

@@ -1,7 +1,7 @@
 //! AVX2 by way of `core::arch`: `wide` does not become AVX2 code inside a `target_feature` function.
 #![allow(unsafe_code)]
 
-use super::{LANES, Level, Simd, Taps};
+use super::{LANES, Simd, SimdLevel, Taps};
 use core::arch::x86_64::*;
 
 /// The AVX2 back-end. Owning one proves that the machine has AVX2.
@@ -10,7 +10,7 @@ pub struct X86V3(());
 
 /// Places in an image, in 256ths of a pixel, and the indices of the pairs to their upper left.
 #[derive(Debug, Clone, Copy)]
-pub struct Aimed<'a> {
+pub struct SamplePositions<'a> {
     image: &'a Taps,
     x: __m256i,
     y: __m256i,
@@ -81,9 +81,9 @@ impl X86V3 {
 // Every `unsafe` block below calls AVX or AVX2 intrinsics, whose only demand is that the machine has them.
 // SAFETY (all of them): `self` exists, so `X86V3::new` has seen AVX2. What else a block needs is said there.
 impl Simd for X86V3 {
-    const LEVEL: Level = Level::X86V3;
+    const LEVEL: SimdLevel = SimdLevel::X86V3;
     type F32 = __m256;
-    type Aimed<'a> = Aimed<'a>;
+    type SamplePositions<'a> = SamplePositions<'a>;
 
     #[inline(always)]
     fn splat(self, value: f32) -> __m256 {
@@ -143,7 +143,7 @@ impl Simd for X86V3 {
     }
 
     #[inline(always)]
-    fn at_least(self, a: __m256, b: __m256) -> u8 {
+    fn simd_ge(self, a: __m256, b: __m256) -> u8 {
         // SAFETY: AVX is there.
         unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(a, b)) as u8 }
     }
@@ -159,13 +159,13 @@ impl Simd for X86V3 {
     }
 
     #[inline(always)]
-    fn whole(self, a: __m256) -> __m256 {
+    fn trunc(self, a: __m256) -> __m256 {
         // SAFETY: AVX is there.
         unsafe { _mm256_round_ps::<{ _MM_FROUND_TO_ZERO | _MM_FROUND_NO_EXC }>(a) }
     }
 
     #[inline(always)]
-    fn places(self, strides: &[i32; LANES], x: __m256, y: __m256) -> [u32; LANES] {
+    fn linear_indices(self, strides: &[i32; LANES], x: __m256, y: __m256) -> [u32; LANES] {
         let mut places = [0; LANES];
         // SAFETY: AVX2 is there; the arrays hold the eight integers that are read and written, aligned or not.
         unsafe {
@@ -178,7 +178,7 @@ impl Simd for X86V3 {
     }
 
     #[inline(always)]
-    fn aim<'a>(self, image: &'a Taps, x: __m256, y: __m256) -> Aimed<'a> {
+    fn sample_positions<'a>(self, image: &'a Taps, x: __m256, y: __m256) -> SamplePositions<'a> {
         let (right, bottom) = image.last();
         // SAFETY: AVX2 is there. Coordinates are brought into [0, right] and [0, bottom], `max` making 0 of what is not a
         // number, so with the image's stride every index is that of a pair that has another one after it.
@@ -188,13 +188,13 @@ impl Simd for X86V3 {
             let y = _mm256_cvttps_epi32(_mm256_min_ps(_mm256_max_ps(y, zero), _mm256_set1_ps(bottom)));
             let stride = _mm256_set1_epi32(image.stride() as i32);
             let row = _mm256_mullo_epi32(_mm256_srli_epi32::<8>(y), stride);
-            Aimed { image, x, y, index: _mm256_add_epi32(row, _mm256_srli_epi32::<8>(x)) }
+            SamplePositions { image, x, y, index: _mm256_add_epi32(row, _mm256_srli_epi32::<8>(x)) }
         }
     }
 
     #[inline(always)]
-    fn read(self, Aimed { image, x, y, index }: Aimed) -> __m256 {
-        // SAFETY: AVX2 is there. Nothing but `aim` makes an `Aimed`, so every index is that of a pair of this image that
+    fn sample_bilinear(self, SamplePositions { image, x, y, index }: SamplePositions) -> __m256 {
+        // SAFETY: AVX2 is there. Nothing but `aim` makes an `SamplePositions`, so every index is that of a pair of this image that
         // has another one after it.
         unsafe {
             let taps = self.read_pairs(image, index);
@@ -235,7 +235,7 @@ impl Simd for X86V3 {
     }
 
     #[inline(always)]
-    fn sum(self, a: __m256) -> f32 {
+    fn reduce_sum(self, a: __m256) -> f32 {
         // SAFETY: AVX is there.
         unsafe {
             let four = _mm_add_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps::<1>(a));
@@ -245,7 +245,7 @@ impl Simd for X86V3 {
     }
 
     #[inline(always)]
-    fn largest(self, a: __m256) -> f32 {
+    fn reduce_max(self, a: __m256) -> f32 {
         // SAFETY: AVX is there.
         unsafe {
             let four = _mm_max_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps::<1>(a));
@@ -262,7 +262,7 @@ impl Simd for X86V3 {
 
     // Each step adds as `sum` does, for twice as many vectors at once.
     #[inline(always)]
-    fn sums(self, vectors: &[__m256; LANES]) -> __m256 {
+    fn reduce_sum_8x8(self, vectors: &[__m256; LANES]) -> __m256 {
         let [a, b, c, d, e, f, g, h] = *vectors;
         let (ab, cd) = (self.add_halves(a, b), self.add_halves(c, d));
         let (ef, gh) = (self.add_halves(e, f), self.add_halves(g, h));

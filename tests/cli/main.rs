@@ -5,7 +5,7 @@ mod layouts;
 
 use layouts::{check_cloud, check_maps, map};
 use serde_json::Value;
-use skep::simd::Level;
+use skep::simd::SimdLevel;
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -107,9 +107,12 @@ fn info_tells_version_machine_and_every_option_of_both_presets() {
     let printed = text(&output.stdout);
     assert!(printed.starts_with(&format!("skep {}\n", env!("CARGO_PKG_VERSION"))), "{printed}");
     assert!(printed.contains("SIMD level: ") && printed.contains("threads: "), "{printed}");
-    for (name, value) in [skep::Options::default(), skep::Options::paper()].iter().flat_map(|o| o.entries()) {
+    for (name, value) in
+        [skep::Options::default(), skep::Options::paper()].iter().flat_map(skep::Options::values)
+    {
         let row = printed.lines().find(|line| line.split_whitespace().next() == Some(name));
         let row = row.unwrap_or_else(|| panic!("no row for {name}:\n{printed}"));
+        let value = value.to_string();
         let first_part = value.split("; ").next().unwrap();
         assert!(row.contains(first_part), "{row} lacks {first_part}");
     }
@@ -126,9 +129,9 @@ fn the_environment_forces_a_simd_level_lowered_to_the_machine_s() {
         let level = printed.lines().find_map(|line| line.strip_prefix("SIMD level: "));
         level.expect("info tells the level").to_owned()
     };
-    let best = Level::ALL.into_iter().rfind(|level| level.is_available()).unwrap();
+    let best = SimdLevel::ALL.into_iter().rfind(|level| level.is_available()).unwrap();
     assert_eq!(level(None), best.name());
-    for forced in Level::ALL {
+    for forced in SimdLevel::ALL {
         assert_eq!(level(Some(forced.name())), forced.min(best).name());
     }
     assert_eq!(level(Some("")), best.name());
@@ -147,14 +150,18 @@ fn help_names_files_and_ways_out() {
 fn wrong_arguments_end_with_status_2_and_say_what_would_be_right() {
     let scene = board();
     let scene = scene.to_str().unwrap();
-    let cases: [(&[&str], &str); 12] = [
+    let cases: [(&[&str], &str); 13] = [
         (&[], "Usage:"),
         (&["reconstruct"], "<SCENE>"),
         (&["reconstruct", scene, "--preset", "quick"], "default, fast, paper"),
-        (&["reconstruct", scene, "--set", "reward"], "NAME=VALUE"),
-        (&["reconstruct", scene, "--set", "reward=much"], "is not a number"),
-        (&["reconstruct", scene, "--scale", "3:4:6+3x1"], "2:4:6+3x1"),
-        (&["reconstruct", scene, "--scale", "2:4:6"], "2:4:6+3x1"),
+        (&["reconstruct", scene, "--set", "smoothness_reward"], "NAME=VALUE"),
+        (&["reconstruct", scene, "--set", "smoothness_reward=much"], "a number from 0 to 1"),
+        (
+            &["reconstruct", scene, "--set", "depth_tolerance=0.1"],
+            "check.depth_tolerance, fusion.depth_tolerance",
+        ),
+        (&["reconstruct", scene, "--schedule", "2:3:5+4x1"], "downscale=2 food_sources=3 iterations=5+4x1"),
+        (&["reconstruct", scene, "--schedule", "downscale=3 food_sources=2 iterations=0+0x1"], "the last 1"),
         (&["reconstruct", scene, "--without", "rewards"], "view-selection, reward, propagation"),
         (
             &["reconstruct", scene, "--depth-range", "2", "1"],
@@ -194,7 +201,10 @@ fn without_points_the_error_names_both_ways_out_and_a_range_is_one() {
     let output = skep(&["reconstruct", path(&scene), "--depth-range", "0.3", "1.5"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let report = report(&scene.path().join("dense"));
-    assert_eq!((&report["views"][0]["near"], &report["views"][0]["far"]), (&0.3.into(), &1.5.into()));
+    assert_eq!(
+        (&report["views"][0]["depth_min"], &report["views"][0]["depth_max"]),
+        (&0.3.into(), &1.5.into())
+    );
 }
 
 #[test]
@@ -211,6 +221,7 @@ fn an_output_that_cannot_be_written_is_found_out_before_the_work() {
 #[test]
 fn parts_of_the_method_can_be_left_out_quietly() {
     let scene = small_board();
+    let schedule = "downscale=2 food_sources=3 iterations=2+1x1; downscale=1 food_sources=2 iterations=1+0x1";
     let output = skep(&[
         "reconstruct",
         path(&scene),
@@ -222,11 +233,9 @@ fn parts_of_the_method_can_be_left_out_quietly() {
         "--without",
         "view-selection,reward,propagation",
         "--set",
-        "spatial_sigma=2.5",
-        "--scale",
-        "2:3:2+1x1",
-        "--scale",
-        "1:2:1+0x1",
+        "sigma_spatial=2.5",
+        "--schedule",
+        schedule,
     ]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     assert!(output.stdout.is_empty(), "{}", text(&output.stdout));
@@ -236,11 +245,15 @@ fn parts_of_the_method_can_be_left_out_quietly() {
         text(&output.stderr)
     );
     let report = report(&scene.path().join("dense"));
-    let option = |name: &str| report["options"][name].as_str().unwrap();
-    assert_eq!([option("view_selection"), option("reward"), option("propagation")], ["0", "0", "0"]);
-    assert_eq!((option("seed"), &report["threads"]), ("7", &2.into()));
-    assert_eq!(option("spatial_sigma"), "2.5");
-    assert_eq!(option("scales"), "1/2: 3 foods, 2 + 1x1 iterations; 1/1: 2 foods, 1 + 0x1 iterations");
+    let option = |name: &str| &report["options"][name];
+    assert_eq!(option("view_selection.pixelwise_view_selection"), false);
+    assert_eq!(
+        (option("search.smoothness_reward"), option("search.view_propagation")),
+        (&0.0.into(), &false.into())
+    );
+    assert_eq!((option("seed"), &report["threads"]), (&7.into(), &2.into()));
+    assert_eq!(option("window.sigma_spatial"), 2.5);
+    assert_eq!(option("schedule.scales"), schedule);
 }
 
 /// README's first command, on a copy: every promised file with its layout, the report, then the cloud again from the
@@ -297,16 +310,16 @@ fn check_report(report: &Value) {
     let views = report["views"].as_array().unwrap();
     let names: Vec<&str> = views.iter().map(|view| view["name"].as_str().unwrap()).collect();
     assert_eq!(names, NAMES);
-    for field in ["pixels", "ncc_evaluations", "samples", "early_outs"] {
+    for field in ["pixels", "ncc_evaluations", "bilinear_samples", "early_terminations"] {
         let sum: u64 = views.iter().map(|view| view[field].as_u64().unwrap()).sum();
         assert_eq!(totals[field], sum, "{field}");
     }
     for outcomes in [&totals["outcomes"], &views[0]["outcomes"]] {
-        assert_eq!(outcomes.as_object().unwrap().len(), skep::Outcome::ALL.len());
+        assert_eq!(outcomes.as_object().unwrap().len(), skep::PixelStatus::ALL.len());
     }
     let outcomes = totals["outcomes"].as_object().unwrap().values();
     assert_eq!(totals["pixels"], outcomes.map(|count| count.as_u64().unwrap()).sum::<u64>());
-    assert!(totals["ncc_evaluations"].as_u64() > Some(0) && totals["samples"].as_u64() > Some(0));
+    assert!(totals["ncc_evaluations"].as_u64() > Some(0) && totals["bilinear_samples"].as_u64() > Some(0));
     assert!(!totals["cycles"].as_array().unwrap().is_empty());
     assert!(totals["cycles"][0]["changed"].as_u64() > Some(0));
     assert_eq!(
@@ -314,7 +327,7 @@ fn check_report(report: &Value) {
         (&env!("CARGO_PKG_VERSION").into(), &"default".into())
     );
     assert!(["scalar", "base", "v3"].contains(&report["simd"].as_str().unwrap()));
-    assert_eq!(report["options"].as_object().unwrap().len(), skep::Options::default().entries().len());
+    assert_eq!(report["options"].as_object().unwrap().len(), skep::Options::default().values().count());
     assert!(report["threads"].as_u64() > Some(0) && report["warnings"].is_array());
 }
 

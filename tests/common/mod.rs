@@ -5,3 +5,9 @@
 
 pub mod measure;
 pub mod procedural;
+
+/// These options with a change.
+pub fn changed(mut options: skep::Options, change: impl FnOnce(&mut skep::Options)) -> skep::Options {
+    change(&mut options);
+    options
+}

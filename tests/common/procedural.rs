@@ -2,7 +2,7 @@
 //! texture, ray-cast. Nothing in them is random from run to run.
 
 use glam::{DMat3, DVec2, DVec3};
-use skep::camera::Camera;
+use skep::geometry::Camera;
 use skep::image::Picture;
 use skep::{Maps, Scene, SparsePoint, View};
 
@@ -11,17 +11,17 @@ use skep::{Maps, Scene, SparsePoint, View};
 pub enum Texture {
     /// Several octaves of noise over the world position.
     Noise,
-    /// One grey value everywhere.
+    /// One gray value everywhere.
     Uniform,
 }
 
 /// A finite surface of the world.
 #[derive(Debug, Clone, Copy)]
 pub enum Shape {
-    /// A rectangle around `centre`, spanned by the unit vectors `right` and `down`, seen from both sides.
-    Rectangle { centre: DVec3, right: DVec3, down: DVec3, half_size: DVec2 },
+    /// A rectangle around `center`, spanned by the unit vectors `right` and `down`, seen from both sides.
+    Rectangle { center: DVec3, right: DVec3, down: DVec3, half_size: DVec2 },
     /// A sphere.
-    Sphere { centre: DVec3, radius: f64 },
+    Sphere { center: DVec3, radius: f64 },
 }
 
 /// A shape with its look.
@@ -67,31 +67,31 @@ const POINT_STEP: usize = 7;
 
 impl Shape {
     /// A rectangle that faces a camera in front of it after a turn of `yaw` degrees around the vertical.
-    pub fn upright(centre: DVec3, yaw: f64, half_size: DVec2) -> Shape {
+    pub fn upright(center: DVec3, yaw: f64, half_size: DVec2) -> Shape {
         let (sine, cosine) = yaw.to_radians().sin_cos();
-        Shape::Rectangle { centre, right: DVec3::new(cosine, 0.0, sine), down: DVec3::Y, half_size }
+        Shape::Rectangle { center, right: DVec3::new(cosine, 0.0, sine), down: DVec3::Y, half_size }
     }
 
     /// Distance of a point from the sphere or from the rectangle's plane.
     pub fn distance(&self, point: DVec3) -> f64 {
         match *self {
-            Shape::Rectangle { centre, right, down, .. } => (point - centre).dot(right.cross(down)).abs(),
-            Shape::Sphere { centre, radius } => (point.distance(centre) - radius).abs(),
+            Shape::Rectangle { center, right, down, .. } => (point - center).dot(right.cross(down)).abs(),
+            Shape::Sphere { center, radius } => (point.distance(center) - radius).abs(),
         }
     }
 
     /// The nearest meeting in front of `origin`: distance in multiples of `direction`, and outward normal.
     fn meet(&self, origin: DVec3, direction: DVec3) -> Option<(f64, DVec3)> {
         match *self {
-            Shape::Rectangle { centre, right, down, half_size } => {
+            Shape::Rectangle { center, right, down, half_size } => {
                 let normal = right.cross(down);
-                let distance = normal.dot(centre - origin) / normal.dot(direction);
-                let offset = origin + direction * distance - centre;
+                let distance = normal.dot(center - origin) / normal.dot(direction);
+                let offset = origin + direction * distance - center;
                 let inside = offset.dot(right).abs() <= half_size.x && offset.dot(down).abs() <= half_size.y;
                 (distance > 0.0 && distance.is_finite() && inside).then_some((distance, normal))
             }
-            Shape::Sphere { centre, radius } => {
-                let (to_origin, squared) = (origin - centre, direction.length_squared());
+            Shape::Sphere { center, radius } => {
+                let (to_origin, squared) = (origin - center, direction.length_squared());
                 let half = to_origin.dot(direction) / squared;
                 let root = half * half - (to_origin.length_squared() - radius * radius) / squared;
                 let distance = -half - root.max(0.0).sqrt();
@@ -118,7 +118,7 @@ fn cast(surfaces: &[Surface], origin: DVec3, direction: DVec3) -> Option<Hit> {
 
 /// What a camera sees in the direction of a pixel. Its ray has z = 1, so the distance is the depth.
 fn look(surfaces: &[Surface], camera: &Camera, pixel: DVec2) -> Option<Hit> {
-    cast(surfaces, camera.centre(), camera.rotation.transpose() * camera.ray(pixel))
+    cast(surfaces, camera.center(), camera.rotation.transpose() * camera.ray(pixel))
 }
 
 impl Procedural {
@@ -168,16 +168,16 @@ impl Procedural {
                 let offset = deviation * ((100..112).map(draw).sum::<f64>() - 6.0);
                 view.picture.rgb(pixel).map(|channel| (f64::from(channel) + offset).round() as u8)
             };
-            let colours = (0..view.camera.pixels()).map(noisy).collect();
-            view.picture = Picture::from_rgb(width, height, colours).expect("one colour for each pixel");
+            let colors = (0..view.camera.pixels()).map(noisy).collect();
+            view.picture = Picture::from_rgb(width, height, colors).expect("one color for each pixel");
         }
         self
     }
 
-    /// What is seen at the centre of a pixel.
+    /// What is seen at the center of a pixel.
     pub fn hit(&self, view: usize, pixel: usize) -> Option<Hit> {
         let camera = &self.views[view].camera;
-        look(&self.surfaces, camera, pixel_centre(camera, pixel))
+        look(&self.surfaces, camera, pixel_center(camera, pixel))
     }
 
     /// Whether a point of a surface is inside a view's image with nothing before it.
@@ -210,8 +210,8 @@ impl Procedural {
     }
 }
 
-/// The centre of the pixel with this index.
-pub fn pixel_centre(camera: &Camera, pixel: usize) -> DVec2 {
+/// The center of the pixel with this index.
+pub fn pixel_center(camera: &Camera, pixel: usize) -> DVec2 {
     let width = camera.width as usize;
     DVec2::new((pixel % width) as f64, (pixel / width) as f64)
 }
@@ -249,13 +249,13 @@ pub const MIDDLE: usize = 4;
 
 /// A slanted wall that fills every image.
 pub fn wall(texture: Texture) -> Surface {
-    let centre = DVec3::new(0.0, 0.0, 0.6);
-    Surface { shape: Shape::upright(centre, 12.0, DVec2::splat(20.0)), texture }
+    let center = DVec3::new(0.0, 0.0, 0.6);
+    Surface { shape: Shape::upright(center, 12.0, DVec2::splat(20.0)), texture }
 }
 
 /// A sphere before a wall, both textured.
 pub fn plane_and_sphere() -> Procedural {
-    let shape = Shape::Sphere { centre: DVec3::new(0.1, 0.0, -0.2), radius: 0.7 };
+    let shape = Shape::Sphere { center: DVec3::new(0.1, 0.0, -0.2), radius: 0.7 };
     Procedural::new(vec![Surface { shape, texture: Texture::Noise }, wall(Texture::Noise)], &cameras())
 }
 
@@ -274,8 +274,8 @@ pub const PANEL: usize = 0;
 /// A textured wall with a uniform rectangle in its plane, in the middle of the images.
 pub fn textureless_panel() -> Procedural {
     let wall = wall(Texture::Noise);
-    let Shape::Rectangle { centre, right, down, .. } = wall.shape else { unreachable!() };
-    let shape = Shape::Rectangle { centre, right, down, half_size: DVec2::new(0.55, 0.4) };
+    let Shape::Rectangle { center, right, down, .. } = wall.shape else { unreachable!() };
+    let shape = Shape::Rectangle { center, right, down, half_size: DVec2::new(0.55, 0.4) };
     // Listed first, so that rays meet the panel, which lies in the wall.
     Procedural::new(vec![Surface { shape, texture: Texture::Uniform }, wall], &cameras())
 }
@@ -283,7 +283,7 @@ pub fn textureless_panel() -> Procedural {
 fn truth(surfaces: &[Surface], camera: &Camera) -> Maps {
     let mut maps = Maps::default();
     for pixel in 0..camera.pixels() {
-        let hit = look(surfaces, camera, pixel_centre(camera, pixel));
+        let hit = look(surfaces, camera, pixel_center(camera, pixel));
         let normal = hit.map_or(DVec3::ZERO, |hit| camera.rotation * hit.normal);
         maps.depth.push(hit.map_or(0.0, |hit| hit.distance as f32));
         maps.normal.push(normal.as_vec3().to_array());
@@ -293,23 +293,23 @@ fn truth(surfaces: &[Surface], camera: &Camera) -> Maps {
 
 fn photograph(surfaces: &[Surface], camera: &Camera) -> Picture {
     let step = 1.0 / f64::from(SUPERSAMPLES);
-    let colour = |pixel: usize| {
-        let centre = pixel_centre(camera, pixel);
+    let color = |pixel: usize| {
+        let center = pixel_center(camera, pixel);
         let mut sum = DVec3::ZERO;
         for sample in 0..SUPERSAMPLES * SUPERSAMPLES {
             let (column, row) = (f64::from(sample % SUPERSAMPLES), f64::from(sample / SUPERSAMPLES));
             let offset = (DVec2::new(column, row) + 0.5) * step - 0.5;
             sum +=
-                look(surfaces, camera, centre + offset).map_or(DVec3::ZERO, |hit| colour_of(surfaces, &hit));
+                look(surfaces, camera, center + offset).map_or(DVec3::ZERO, |hit| color_of(surfaces, &hit));
         }
         (sum * step * step * 255.0).round().to_array().map(|channel| channel as u8)
     };
-    let colours = (0..camera.pixels()).map(colour).collect();
-    Picture::from_rgb(camera.width, camera.height, colours).expect("one colour for each pixel")
+    let colors = (0..camera.pixels()).map(color).collect();
+    Picture::from_rgb(camera.width, camera.height, colors).expect("one color for each pixel")
 }
 
 /// Red, green and blue, 0 to 1.
-fn colour_of(surfaces: &[Surface], hit: &Hit) -> DVec3 {
+fn color_of(surfaces: &[Surface], hit: &Hit) -> DVec3 {
     match surfaces[hit.surface].texture {
         Texture::Uniform => DVec3::splat(0.5),
         Texture::Noise => {

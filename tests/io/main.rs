@@ -9,7 +9,7 @@ mod scene_folder;
 mod workspace;
 
 use glam::{DMat3, DQuat, DVec3};
-use skep::camera::Camera;
+use skep::geometry::Camera;
 use skep::io::{ColmapModel, ModelImage};
 use skep::{Result, SparsePoint};
 use std::path::Path;

@@ -38,7 +38,7 @@ fn assert_close(a: &ColmapModel, b: &ColmapModel) {
         let difference = a.camera.rotation - b.camera.rotation;
         assert!(difference.to_cols_array().iter().all(|e| e.abs() < 1e-12));
         let unturned = |image: &ModelImage| ModelImage {
-            camera: skep::camera::Camera { rotation: DMat3::IDENTITY, ..image.camera },
+            camera: skep::geometry::Camera { rotation: DMat3::IDENTITY, ..image.camera },
             ..image.clone()
         };
         assert_eq!(unturned(a), unturned(b));
@@ -52,7 +52,7 @@ fn text_is_read_in_the_order_of_the_file() {
     assert_eq!(names, ["second in order.png", "cam1/first.png"]);
     assert_eq!(model.points[0].views, [0, 1], "ids become indices, each once");
     assert_eq!(model.points[0].position.to_array(), [0.5, -0.25, 4.0]);
-    assert_eq!(model.images[0].camera.rotation, DMat3::IDENTITY, "the quaternion is normalised");
+    assert_eq!(model.images[0].camera.rotation, DMat3::IDENTITY, "the quaternion is normalized");
     assert_eq!(model.images[0].camera.translation.to_array(), [1.0, 2.0, 3.0]);
 }
 
@@ -223,7 +223,7 @@ fn broken_binary_numbers_are_refused() {
         read_changed("points3D.bin", |b| b[16..24].copy_from_slice(&nan)),
         &["points3D.bin", "finite"],
     );
-    // Count, id, position, colour, error, length of the track, then its first image.
+    // Count, id, position, color, error, length of the track, then its first image.
     assert_refused(
         read_changed("points3D.bin", |b| b[59..63].fill(9)),
         &["points3D.bin", "point 1", "image"],

@@ -7,7 +7,7 @@ use std::path::Path;
 use tempfile::tempdir;
 
 #[test]
-fn grey_and_colour_of_8_and_16_bits_are_read() {
+fn gray_and_color_of_8_and_16_bits_are_read() {
     let folder = tempdir().unwrap();
     let path = folder.path().join("picture.png");
     let read = |width, height, bytes: &[u8], kind| {
@@ -16,16 +16,16 @@ fn grey_and_colour_of_8_and_16_bits_are_read() {
     };
     let deep = |values: &[u16]| values.iter().flat_map(|value| value.to_ne_bytes()).collect::<Vec<_>>();
 
-    let grey = read(2, 1, &[7, 250], ExtendedColorType::L8);
-    assert_eq!((grey.width(), grey.height(), grey.grey()), (2, 1, [7, 250].as_slice()));
-    assert_eq!(grey.rgb(1), [250; 3]);
+    let gray = read(2, 1, &[7, 250], ExtendedColorType::L8);
+    assert_eq!((gray.width(), gray.height(), gray.gray()), (2, 1, [7, 250].as_slice()));
+    assert_eq!(gray.rgb(1), [250; 3]);
     // 16 bits are rounded: 128.5 / 257 is the border between 0 and 1.
-    let grey = read(3, 2, &deep(&[128, 129, 65535, 65406, 65407, 257]), ExtendedColorType::L16);
-    assert_eq!(grey.grey(), [0, 1, 255, 254, 255, 1]);
-    assert_eq!(read(1, 1, &[9, 0], ExtendedColorType::La8).grey(), [9], "alpha is dropped");
+    let gray = read(3, 2, &deep(&[128, 129, 65535, 65406, 65407, 257]), ExtendedColorType::L16);
+    assert_eq!(gray.gray(), [0, 1, 255, 254, 255, 1]);
+    assert_eq!(read(1, 1, &[9, 0], ExtendedColorType::La8).gray(), [9], "alpha is dropped");
 
-    let colour = read(1, 2, &[1, 2, 3, 90, 80, 70], ExtendedColorType::Rgb8);
-    assert_eq!((colour.rgb(0), colour.rgb(1)), ([1, 2, 3], [90, 80, 70]));
+    let color = read(1, 2, &[1, 2, 3, 90, 80, 70], ExtendedColorType::Rgb8);
+    assert_eq!((color.rgb(0), color.rgb(1)), ([1, 2, 3], [90, 80, 70]));
     assert_eq!(read(1, 1, &deep(&[257, 514, 65535]), ExtendedColorType::Rgb16).rgb(0), [1, 2, 255]);
     assert_eq!(read(1, 1, &[5, 6, 7, 0], ExtendedColorType::Rgba8).rgb(0), [5, 6, 7], "alpha is dropped");
 }
@@ -40,7 +40,7 @@ fn jpeg_is_read_whatever_its_name() {
     std::fs::rename(&path, &renamed).unwrap();
     let picture = read_picture(&renamed).unwrap();
     assert_eq!(picture_size(&renamed).unwrap(), (8, 8));
-    assert!(picture.grey().iter().all(|grey| grey.abs_diff(100) <= 1));
+    assert!(picture.gray().iter().all(|gray| gray.abs_diff(100) <= 1));
 }
 
 #[test]

@@ -13,7 +13,7 @@ fn cloud() -> PointCloud {
     PointCloud {
         positions: vec![[1.0, -2.5, 3.25], [0.0, 0.5, 1e6]],
         normals: vec![[0.0, 0.0, -1.0], [0.6, 0.8, 0.0]],
-        colours: vec![[255, 0, 7], [1, 2, 3]],
+        colors: vec![[255, 0, 7], [1, 2, 3]],
         views,
     }
 }
@@ -77,8 +77,8 @@ fn broken_clouds_are_refused() {
     assert_refused(read_changed(&replace("float nx", "float w")), &["float x y z nx ny nz"]);
     assert_refused(read_changed(&replace("float x", "double x")), &["float x y z nx ny nz"]);
     assert_refused(read_changed(&replace("binary_little", "binary_big")), &["binary_little_endian"]);
-    let short = PointCloud { colours: vec![], ..cloud() };
-    assert_refused(write_ply(&path, &short), &["cloud.colours", "0 values", "2 points"]);
+    let short = PointCloud { colors: vec![], ..cloud() };
+    assert_refused(write_ply(&path, &short), &["cloud.colors", "0 values", "2 points"]);
 }
 
 #[test]

@@ -2,12 +2,12 @@
 
 use crate::scene_folder::write_pictures;
 use crate::{assert_refused, camera, model};
+use skep::geometry::ViewSets;
 use skep::io::{
     MapKind, SceneFolder, Workspace, read_consistency_graph, read_ply, read_visibility, write_depth_map,
     write_normal_map,
 };
-use skep::views::ViewSets;
-use skep::{Counts, Maps, Outcome, PointCloud, PointViews, ViewResult};
+use skep::{Counts, Maps, PixelStatus, PointCloud, PointViews, ViewResult};
 use std::path::Path;
 use tempfile::{TempDir, tempdir};
 
@@ -18,16 +18,16 @@ fn result() -> ViewResult {
         width: 6,
         estimate: Maps { depth: vec![0.0; 24], normal: vec![[0.0; 3]; 24] },
         cost: vec![0.0; 24],
-        outcome: vec![Outcome::Masked; 24],
+        status: vec![PixelStatus::Masked; 24],
         sources: vec![5, 2],
         view_sets: ViewSets::empty(24, 2),
         counts: Counts::default(),
         cycles: vec![],
     };
-    for (pixel, outcome) in [(3, Outcome::Validated), (4, Outcome::Inconsistent)] {
+    for (pixel, status) in [(3, PixelStatus::Validated), (4, PixelStatus::Inconsistent)] {
         result.estimate.depth[pixel] = pixel as f32;
         result.estimate.normal[pixel] = [0.0, 0.6, -0.8];
-        result.outcome[pixel] = outcome;
+        result.status[pixel] = status;
         result.view_sets.insert(pixel, 1);
     }
     result.view_sets.insert(3, 0);
@@ -86,7 +86,7 @@ fn a_cloud_is_written_with_its_visibility_beside_it() {
     let cloud = PointCloud {
         positions: vec![[1.0, 2.0, 3.0]],
         normals: vec![[0.0, 0.0, 1.0]],
-        colours: vec![[1, 2, 3]],
+        colors: vec![[1, 2, 3]],
         views: views.clone(),
     };
     Workspace::write_cloud(&workspace.cloud(), &cloud).unwrap();

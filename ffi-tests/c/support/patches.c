@@ -2,16 +2,16 @@
 
 #include "check.h"
 
-skep_window *make_window(void) {
-    skep_window *window = NULL;
-    REQUIRE(skep_window_create(4, 1, 4, 0.2, 1e-5, &window));
+skep_ncc_window *make_window(void) {
+    skep_ncc_window *window = NULL;
+    REQUIRE(skep_ncc_window_create(4, 1, 4, 0.2, 1e-5, &window));
     return window;
 }
 
-skep_samples *make_samples(const scene *made, uint32_t view) {
+skep_packed_image *make_samples(const scene *made, uint32_t view) {
     const skep_image image = scene_image(made, view);
-    skep_samples *samples = NULL;
-    REQUIRE(skep_samples_create(&image, &samples));
+    skep_packed_image *samples = NULL;
+    REQUIRE(skep_packed_image_create(&image, &samples));
     return samples;
 }
 

@@ -15,11 +15,11 @@ view_maps maps_of(const skep_result *result, uint32_t view) {
         REQUIRE(skep_result_get_normal(result, view, which, maps.normal[which], 12 * width));
     }
     maps.cost = take(pixels, sizeof *maps.cost);
-    maps.outcome = take(pixels, sizeof *maps.outcome);
+    maps.status = take(pixels, sizeof *maps.status);
     maps.source_count = take(pixels, sizeof *maps.source_count);
     maps.source_bits = take(pixels, sizeof *maps.source_bits);
     REQUIRE(skep_result_get_cost(result, view, maps.cost, 4 * width));
-    REQUIRE(skep_result_get_outcome(result, view, maps.outcome, width));
+    REQUIRE(skep_result_get_status(result, view, maps.status, width));
     REQUIRE(skep_result_get_source_count(result, view, maps.source_count, 2 * width));
     REQUIRE(skep_result_get_source_bits(result, view, 0, maps.source_bits, 4 * width));
     REQUIRE(skep_result_get_sources(result, view, maps.sources, 32, &maps.source_total));
@@ -34,7 +34,7 @@ void maps_free(view_maps *maps) {
         free(maps->normal[which]);
     }
     free(maps->cost);
-    free(maps->outcome);
+    free(maps->status);
     free(maps->source_count);
     free(maps->source_bits);
 }
@@ -42,8 +42,8 @@ void maps_free(view_maps *maps) {
 static int same_cycles(const view_maps *a, const view_maps *b) {
     int same = a->cycle_total == b->cycle_total;
     for (size_t i = 0; same && i < a->cycle_total; ++i) {
-        const skep_cycle *x = &a->cycles[i], *y = &b->cycles[i];
-        same = x->reduction == y->reduction && x->cycle == y->cycle && x->pixels == y->pixels &&
+        const skep_cycle_record *x = &a->cycles[i], *y = &b->cycles[i];
+        same = x->downscale == y->downscale && x->cycle == y->cycle && x->pixels == y->pixels &&
                x->changed == y->changed && x->validated == y->validated;
     }
     return same;
@@ -60,7 +60,7 @@ void check_same_maps(const view_maps *a, const view_maps *b, const char *what) {
               which);
     }
     CHECK(same_bytes(a->cost, b->cost, 4 * pixels), "%s", what);
-    CHECK(same_bytes(a->outcome, b->outcome, pixels), "%s", what);
+    CHECK(same_bytes(a->status, b->status, pixels), "%s", what);
     CHECK(same_bytes(a->source_count, b->source_count, 2 * pixels), "%s", what);
     CHECK(same_bytes(a->source_bits, b->source_bits, 4 * pixels), "%s", what);
     CHECK(a->source_total == b->source_total &&
@@ -89,10 +89,10 @@ points points_of(const skep_cloud *cloud) {
     REQUIRE(skep_cloud_get_count(cloud, &all.count, &all.view_total));
     all.positions = take(all.count, 3 * sizeof *all.positions);
     all.normals = take(all.count, 3 * sizeof *all.normals);
-    all.colours = take(all.count, 3);
+    all.colors = take(all.count, 3);
     all.view_counts = take(all.count, sizeof *all.view_counts);
     all.views = take(all.view_total, sizeof *all.views);
-    REQUIRE(skep_cloud_get_points(cloud, all.positions, all.normals, all.colours, all.count));
+    REQUIRE(skep_cloud_get_points(cloud, all.positions, all.normals, all.colors, all.count));
     REQUIRE(skep_cloud_get_views(cloud, all.view_counts, all.count, all.views, all.view_total));
     return all;
 }
@@ -108,7 +108,7 @@ points points_of_result(const skep_result *result) {
 void points_free(points *all) {
     free(all->positions);
     free(all->normals);
-    free(all->colours);
+    free(all->colors);
     free(all->view_counts);
     free(all->views);
 }
@@ -121,7 +121,7 @@ void check_same_points(const points *a, const points *b, const char *what) {
     }
     CHECK(same_bytes(a->positions, b->positions, a->count * 3 * sizeof *a->positions), "%s", what);
     CHECK(same_bytes(a->normals, b->normals, a->count * 3 * sizeof *a->normals), "%s", what);
-    CHECK(same_bytes(a->colours, b->colours, a->count * 3), "%s", what);
+    CHECK(same_bytes(a->colors, b->colors, a->count * 3), "%s", what);
     CHECK(same_bytes(a->view_counts, b->view_counts, a->count * sizeof *a->view_counts), "%s",
           what);
     CHECK(same_bytes(a->views, b->views, a->view_total * sizeof *a->views), "%s", what);

@@ -11,13 +11,13 @@ typedef struct view_maps {
     float *depth[2];
     float *normal[2];
     float *cost;
-    uint8_t *outcome;
+    uint8_t *status;
     uint16_t *source_count;
     uint32_t *source_bits;
     uint32_t sources[32];
     size_t source_total;
     skep_statistics statistics;
-    skep_cycle cycles[64];
+    skep_cycle_record cycles[64];
     size_t cycle_total;
 } view_maps;
 
@@ -34,7 +34,7 @@ typedef struct points {
     size_t view_total;
     double *positions;
     float *normals;
-    uint8_t *colours;
+    uint8_t *colors;
     uint32_t *view_counts;
     uint32_t *views;
 } points;

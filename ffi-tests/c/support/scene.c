@@ -28,14 +28,14 @@ static vec3 unit(vec3 a) {
 
 /* A piece of a plane with two axes on it, as wide as `half` says. */
 typedef struct panel {
-    vec3 centre, along_u, along_v, normal;
+    vec3 center, along_u, along_v, normal;
     double half_u, half_v;
 } panel;
 
-static panel make_panel(vec3 centre, vec3 normal, double half_u, double half_v) {
+static panel make_panel(vec3 center, vec3 normal, double half_u, double half_v) {
     const vec3 facing = unit(normal);
     const vec3 along_u = unit(cross((vec3){0, 1, 0}, facing));
-    return (panel){centre, along_u, cross(facing, along_u), facing, half_u, half_v};
+    return (panel){center, along_u, cross(facing, along_u), facing, half_u, half_v};
 }
 
 const double SCENE_NEAR = 2.0;
@@ -57,7 +57,7 @@ static double cell(int32_t x, int32_t y, uint32_t seed) {
     return (hash ^ (hash >> 15)) / 4294967296.0;
 }
 
-/* Those numbers with smooth steps between them. */
+/* Those numbers with smooth stepper between them. */
 static double noise(double x, double y, uint32_t seed) {
     const double left = floor(x), top = floor(y);
     double u = x - left, v = y - top;
@@ -73,15 +73,15 @@ static double noise(double x, double y, uint32_t seed) {
 /* The ray's way to the surface, in lengths of `direction`; 0 where it misses. */
 static double hit(const panel *at, vec3 from, vec3 direction, double *u, double *v) {
     const double along = dot(at->normal, direction);
-    const double way = dot(at->normal, add(at->centre, from, -1)) / along;
-    const vec3 on_plane = add(add(from, direction, way), at->centre, -1);
+    const double way = dot(at->normal, add(at->center, from, -1)) / along;
+    const vec3 on_plane = add(add(from, direction, way), at->center, -1);
     *u = dot(on_plane, at->along_u);
     *v = dot(on_plane, at->along_v);
     return fabs(*u) <= at->half_u && fabs(*v) <= at->half_v ? way : 0;
 }
 
 typedef struct pose {
-    vec3 centre, right, down, forward;
+    vec3 center, right, down, forward;
 } pose;
 
 static vec3 ray(const skep_camera *camera, const pose *from, double x, double y) {
@@ -90,7 +90,7 @@ static vec3 ray(const skep_camera *camera, const pose *from, double x, double y)
 }
 
 /* What a ray of length 1 in depth meets first: 1 the wall, 2 the board. */
-static int look(vec3 from, vec3 direction, double *depth, panel *met, double colour[3]) {
+static int look(vec3 from, vec3 direction, double *depth, panel *met, double color[3]) {
     double u, v;
     int which = 2;
     *met = board();
@@ -104,7 +104,7 @@ static int look(vec3 from, vec3 direction, double *depth, panel *met, double col
     const double grain =
         0.6 * noise(u / 0.26, v / 0.26, seed) + 0.4 * noise(u / 0.12, v / 0.12, seed + 1);
     for (uint32_t channel = 0; channel < 3; ++channel) {
-        colour[channel] = 0.8 * grain + 0.2 * noise(u / 0.3, v / 0.3, seed + 2 + channel);
+        color[channel] = 0.8 * grain + 0.2 * noise(u / 0.3, v / 0.3, seed + 2 + channel);
     }
     return which;
 }
@@ -113,29 +113,29 @@ static void photograph_pixel(const scene *made, photograph *taken, const pose *f
                              uint32_t y) {
     const size_t pixel = (size_t)y * made->width + x;
     panel met;
-    double depth, colour[3], sum[3] = {0, 0, 0};
-    const int centre = look(from->centre, ray(&taken->camera, from, x, y), &depth, &met, colour);
+    double depth, color[3], sum[3] = {0, 0, 0};
+    const int center = look(from->center, ray(&taken->camera, from, x, y), &depth, &met, color);
     taken->depth[pixel] = (float)depth;
     taken->normal[3 * pixel] = (float)dot(met.normal, from->right);
     taken->normal[3 * pixel + 1] = (float)dot(met.normal, from->down);
     taken->normal[3 * pixel + 2] = (float)dot(met.normal, from->forward);
-    taken->surface[pixel] = (uint8_t)centre;
+    taken->surface[pixel] = (uint8_t)center;
     /* A pixel sees the mean of its area. */
     enum { SIDE = 3 };
     for (int sample = 0; sample < SIDE * SIDE; ++sample) {
         const double dx = (sample % SIDE - SIDE / 2) / (double)SIDE;
         const double dy = (sample / SIDE - SIDE / 2) / (double)SIDE;
-        look(from->centre, ray(&taken->camera, from, x + dx, y + dy), &depth, &met, colour);
+        look(from->center, ray(&taken->camera, from, x + dx, y + dy), &depth, &met, color);
         for (int channel = 0; channel < 3; ++channel) {
-            sum[channel] += colour[channel] / (SIDE * SIDE);
+            sum[channel] += color[channel] / (SIDE * SIDE);
         }
     }
     /* Windows that see the board and the wall fit neither: they are left out of what is checked. */
     const int reach = 4;
     for (int corner = 0; corner < 9; ++corner) {
         const double dx = (corner % 3 - 1) * reach, dy = (corner / 3 - 1) * reach;
-        if (look(from->centre, ray(&taken->camera, from, x + dx, y + dy), &depth, &met, colour) !=
-            centre) {
+        if (look(from->center, ray(&taken->camera, from, x + dx, y + dy), &depth, &met, color) !=
+            center) {
             taken->surface[pixel] = 0;
         }
     }
@@ -147,8 +147,8 @@ static void photograph_pixel(const scene *made, photograph *taken, const pose *f
 static void take_photograph(scene *made, uint32_t view) {
     photograph *taken = &made->photographs[view];
     const double step = view - 0.5 * (made->views - 1);
-    pose from = {.centre = {0.6 * step, view % 2 ? 0.2 : -0.1, 0.05 * step}};
-    from.forward = unit(add((vec3){0, 0, 4.6}, from.centre, -1));
+    pose from = {.center = {0.6 * step, view % 2 ? 0.2 : -0.1, 0.05 * step}};
+    from.forward = unit(add((vec3){0, 0, 4.6}, from.center, -1));
     from.right = unit(cross((vec3){0, 1, 0}, from.forward));
     from.down = cross(from.forward, from.right);
 
@@ -159,7 +159,7 @@ static void take_photograph(scene *made, uint32_t view) {
     const vec3 rows[3] = {from.right, from.down, from.forward};
     for (int row = 0; row < 3; ++row) {
         memcpy(camera->rotation + 3 * row, &rows[row], sizeof rows[row]);
-        camera->translation[row] = -dot(rows[row], from.centre);
+        camera->translation[row] = -dot(rows[row], from.center);
     }
     const size_t pixels = scene_pixels(made);
     taken->rgb = take(pixels, 3);

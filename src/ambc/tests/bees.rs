@@ -1,11 +1,11 @@
 //! Each kind of bee.
 
 use super::*;
-use crate::ambc::MIN_FACING;
-use crate::ambc::colony::{Colonies, colour};
-use crate::ambc::food::cost_to_beat;
+use crate::ambc::colony::{Colonies, color};
+use crate::ambc::food_source::cost_to_beat;
 use crate::ambc::random::Random;
 use crate::ambc::{OnlookerRules, employed, onlooker, scout};
+use crate::geometry::MIN_FACING;
 use crate::testing::window;
 use glam::Vec3;
 
@@ -79,18 +79,18 @@ fn employed_bees_work_on_the_first_food_sources_only_where_they_are_told_so() {
 
 // Onlooker bees.
 
-/// Onlookers that go to the first neighbour drawn.
+/// Onlookers that go to the first neighbor drawn.
 fn plain(reward: f32) -> OnlookerRules {
     OnlookerRules { reward, draws: 1 }
 }
 
-/// Colonies in which every pixel of the other colour has the wall as its best, its depth multiplied.
-fn neighbours(world: &World, factor: f32, validated: bool) -> Colonies {
+/// Colonies in which every pixel of the other color has the wall as its best, its depth multiplied.
+fn neighbors(world: &World, factor: f32, validated: bool) -> Colonies {
     let (width, height) = (world.images[0].width, world.images[0].height);
     let mut colonies = Colonies::new(width, height, 1);
-    let other = 1 - colour(PIXEL.0, PIXEL.1);
+    let other = 1 - color(PIXEL.0, PIXEL.1);
     for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-        if colour(x, y) == other {
+        if color(x, y) == other {
             let at = y * colonies.row_len() + x / 2;
             colonies.foods[at] = FoodSource { validated, cost: 0.0, ..wall(world, (x, y), factor) };
         }
@@ -99,17 +99,17 @@ fn neighbours(world: &World, factor: f32, validated: bool) -> Colonies {
 }
 
 #[test]
-fn onlookers_bring_a_neighbour_s_plane_to_the_pixel() {
+fn onlookers_bring_a_neighbor_s_plane_to_the_pixel() {
     let (world, window) = (World::five(), window());
     let reference = world.reference();
     let mut evaluator = standing(&reference, &window, &options(), false);
-    let neighbours = neighbours(&world, 1.0, false);
+    let neighbors = neighbors(&world, 1.0, false);
     let wrong = evaluated(&mut evaluator, wall(&world, PIXEL, 1.2));
     for seed in 0..100 {
         let mut foods = [FoodSource { trials: 5, ..wrong }];
-        onlooker::send(&mut evaluator, &mut foods, &neighbours, PIXEL, plain(0.0), &mut Random::new(3, seed));
+        onlooker::send(&mut evaluator, &mut foods, &neighbors, PIXEL, plain(0.0), &mut Random::new(3, seed));
         let [food] = foods;
-        // The wall is slanted: a neighbour's depth is another one.
+        // The wall is slanted: a neighbor's depth is another one.
         assert!((food.depth / wall(&world, PIXEL, 1.0).depth - 1.0).abs() < 1e-5, "{food:?}");
         assert_eq!((food.normal, food.trials), (testing::normal(&world.cameras[0]), 0));
         assert_eq!(food.cost, evaluator.cost(&food, f32::INFINITY));
@@ -117,28 +117,28 @@ fn onlookers_bring_a_neighbour_s_plane_to_the_pixel() {
 }
 
 #[test]
-fn of_the_neighbours_drawn_the_one_of_the_cheapest_plane_is_visited() {
+fn of_the_neighbors_drawn_the_one_of_the_cheapest_plane_is_visited() {
     let (world, window) = (World::five(), window());
     let reference = world.reference();
     let mut evaluator = standing(&reference, &window, &options(), false);
-    // The neighbours to the left know the wall, the others a plane that costs them more.
-    let mut neighbours = neighbours(&world, 1.0, false);
+    // The neighbors to the left know the wall, the others a plane that costs them more.
+    let mut neighbors = neighbors(&world, 1.0, false);
     for (x, y) in (0..28).flat_map(|y| (PIXEL.0..36).map(move |x| (x, y))) {
-        let at = y * neighbours.row_len() + x / 2;
-        if neighbours.foods[at].depth > 0.0 {
-            neighbours.foods[at] = FoodSource { cost: 1.5, ..wall(&world, (x, y), 1.1) };
+        let at = y * neighbors.row_len() + x / 2;
+        if neighbors.foods[at].depth > 0.0 {
+            neighbors.foods[at] = FoodSource { cost: 1.5, ..wall(&world, (x, y), 1.1) };
         }
     }
     let wrong = evaluated(&mut evaluator, wall(&world, PIXEL, 1.2));
     let mut found_by = |draws: u32| {
         let finds = |seed: &u64| {
             let (mut foods, rules) = ([wrong], OnlookerRules { reward: 0.0, draws });
-            onlooker::send(&mut evaluator, &mut foods, &neighbours, PIXEL, rules, &mut Random::new(3, *seed));
+            onlooker::send(&mut evaluator, &mut foods, &neighbors, PIXEL, rules, &mut Random::new(3, *seed));
             (foods[0].depth / wall(&world, PIXEL, 1.0).depth - 1.0).abs() < 1e-5
         };
         (0..200).filter(finds).count()
     };
-    // Eight of the twenty neighbours lie to the left.
+    // Eight of the twenty neighbors lie to the left.
     let [one, three, many] = [1, 3, 20].map(&mut found_by);
     assert!((50..110).contains(&one), "{one} of 200 by one draw");
     assert!((135..180).contains(&three), "{three} of 200 by three draws");
@@ -146,7 +146,7 @@ fn of_the_neighbours_drawn_the_one_of_the_cheapest_plane_is_visited() {
 }
 
 #[test]
-fn of_equally_cheap_planes_the_one_of_the_neighbour_that_looks_most_alike_is_visited() {
+fn of_equally_cheap_planes_the_one_of_the_neighbor_that_looks_most_alike_is_visited() {
     let world = World::five();
     let window = Window::new(5, 2, 5.0, 0.03, 1e-5);
     let reference = world.reference();
@@ -155,22 +155,22 @@ fn of_equally_cheap_planes_the_one_of_the_neighbour_that_looks_most_alike_is_vis
         (PIXEL.0.wrapping_add_signed(dx as isize), PIXEL.1.wrapping_add_signed(dy as isize))
     };
     let difference =
-        |(x, y): (usize, usize)| reference.image.grey(x, y).abs_diff(reference.image.grey(PIXEL.0, PIXEL.1));
+        |(x, y): (usize, usize)| reference.image.gray(x, y).abs_diff(reference.image.gray(PIXEL.0, PIXEL.1));
     let most_alike = onlooker::OFFSETS.into_iter().map(place).min_by_key(|&at| difference(at)).unwrap();
-    let mut neighbours = neighbours(&world, 1.1, false);
-    let at = most_alike.1 * neighbours.row_len() + most_alike.0 / 2;
-    neighbours.foods[at] = FoodSource { cost: 0.0, ..wall(&world, most_alike, 1.0) };
+    let mut neighbors = neighbors(&world, 1.1, false);
+    let at = most_alike.1 * neighbors.row_len() + most_alike.0 / 2;
+    neighbors.foods[at] = FoodSource { cost: 0.0, ..wall(&world, most_alike, 1.0) };
     let wrong = evaluated(&mut evaluator, wall(&world, PIXEL, 1.2));
     for seed in 0..20 {
         let (mut foods, rules) = ([wrong], OnlookerRules { reward: 0.0, draws: 300 });
-        onlooker::send(&mut evaluator, &mut foods, &neighbours, PIXEL, rules, &mut Random::new(3, seed));
+        onlooker::send(&mut evaluator, &mut foods, &neighbors, PIXEL, rules, &mut Random::new(3, seed));
         let off = foods[0].depth / wall(&world, PIXEL, 1.0).depth - 1.0;
         assert!(off.abs() < 1e-5, "{off} after seed {seed}");
     }
 }
 
 #[test]
-fn a_slightly_dearer_plane_is_taken_from_a_validated_neighbour_only_and_at_its_true_cost() {
+fn a_slightly_dearer_plane_is_taken_from_a_validated_neighbor_only_and_at_its_true_cost() {
     const REWARD: f32 = 0.05;
     let (world, window) = (World::five(), window());
     let reference = world.reference();
@@ -184,9 +184,9 @@ fn a_slightly_dearer_plane_is_taken_from_a_validated_neighbour_only_and_at_its_t
     let far_off = far_off.expect("a plane much dearer");
 
     let mut after = |factor: f32, validated: bool, reward: f32| {
-        let neighbours = neighbours(&world, factor, validated);
+        let neighbors = neighbors(&world, factor, validated);
         let mut foods = [own];
-        onlooker::send(&mut evaluator, &mut foods, &neighbours, PIXEL, plain(reward), &mut Random::new(3, 4));
+        onlooker::send(&mut evaluator, &mut foods, &neighbors, PIXEL, plain(reward), &mut Random::new(3, 4));
         (foods[0], evaluator.cost(&foods[0], f32::INFINITY))
     };
     let kept = FoodSource { trials: 1, ..own };
@@ -199,7 +199,7 @@ fn a_slightly_dearer_plane_is_taken_from_a_validated_neighbour_only_and_at_its_t
 }
 
 #[test]
-fn neighbours_that_were_never_searched_bring_nothing() {
+fn neighbors_that_were_never_searched_bring_nothing() {
     let (world, window) = (World::five(), window());
     let reference = world.reference();
     let mut evaluator = standing(&reference, &window, &options(), false);
@@ -211,7 +211,7 @@ fn neighbours_that_were_never_searched_bring_nothing() {
 }
 
 #[test]
-fn onlookers_visit_the_other_colour_only() {
+fn onlookers_visit_the_other_color_only() {
     let mut offsets = onlooker::OFFSETS.to_vec();
     assert!(offsets.iter().all(|(x, y)| (x + y) % 2 != 0));
     offsets.sort_unstable();
@@ -261,29 +261,28 @@ fn the_best_stands_first_with_its_trials_and_of_equals_the_earlier() {
     assert_eq!(unevaluated[0].trials, 1);
 }
 
-// The neighbours' say.
+// The neighbors' say.
 
 #[test]
-fn a_plane_that_continues_the_validated_neighbours_is_preferred_and_others_pay_up_to_a_limit() {
+fn a_plane_that_continues_the_validated_neighbors_is_preferred_and_others_pay_up_to_a_limit() {
     let (world, window) = (World::five(), window());
     let reference = world.reference();
-    let smooth = Options {
-        smoothness: 0.2,
-        smoothness_depth: 0.01,
-        smoothness_normal: 40.0,
-        colour_sigma: 1e3,
-        ..options()
-    };
+    let smooth = changed(options(), |o| {
+        o.cost.smoothness_weight = 0.2;
+        o.cost.smoothness_max_depth_error = 0.01;
+        o.cost.smoothness_max_normal_error = 40.0;
+        o.window.sigma_color = 1e3;
+    });
     let food = |cost, factor| FoodSource { cost, ..wall(&world, PIXEL, factor) };
     // The dearer plane stands first exactly if what it saves in smoothness is more.
     let prefers_wall = |validated, factor, extra: f32| {
         let mut evaluator = standing(&reference, &window, &smooth, false);
-        evaluator.look_around(&neighbours(&world, 1.0, validated), PIXEL);
+        evaluator.look_around(&neighbors(&world, 1.0, validated), PIXEL);
         let mut foods = [food(0.1, factor), food(0.1 + extra, 1.0)];
         evaluator.best_first(&mut foods);
         foods[0] == food(0.1 + extra, 1.0)
     };
-    assert!(!prefers_wall(false, 1.05, 0.001), "neighbours that are not validated have no say");
+    assert!(!prefers_wall(false, 1.05, 0.001), "neighbors that are not validated have no say");
     assert!(
         prefers_wall(true, 1.005, 0.03) && !prefers_wall(true, 1.005, 0.07),
         "half of the limit, by square"
@@ -293,17 +292,19 @@ fn a_plane_that_continues_the_validated_neighbours_is_preferred_and_others_pay_u
 }
 
 #[test]
-fn neighbours_of_another_grey_have_no_say() {
+fn neighbors_of_another_gray_have_no_say() {
     let mut world = World::five();
-    let grey = |x: usize, y: usize| if (x, y) == PIXEL { 255 } else { 90 };
+    let gray = |x: usize, y: usize| if (x, y) == PIXEL { 255 } else { 90 };
     let (width, height) = (world.images[0].width, world.images[0].height);
-    let greys = (0..width * height).map(|pixel| grey(pixel % width, pixel / width)).collect();
-    let picture = crate::image::Picture::from_grey(width as u32, height as u32, greys).unwrap();
+    let grays = (0..width * height).map(|pixel| gray(pixel % width, pixel / width)).collect();
+    let picture = crate::image::Picture::from_gray(width as u32, height as u32, grays).unwrap();
     world.images[0] = crate::image::PackedImage::new(&picture);
     let (reference, window) = (world.reference(), window());
-    let smooth = Options { smoothness: 0.2, ..options() };
+    let smooth = changed(options(), |o| {
+        o.cost.smoothness_weight = 0.2;
+    });
     let mut evaluator = standing(&reference, &window, &smooth, false);
-    evaluator.look_around(&neighbours(&world, 1.0, true), PIXEL);
+    evaluator.look_around(&neighbors(&world, 1.0, true), PIXEL);
     let food = |cost, factor| FoodSource { cost, ..wall(&world, PIXEL, factor) };
     let mut foods = [food(0.1, 1.05), food(0.12, 1.0)];
     evaluator.best_first(&mut foods);

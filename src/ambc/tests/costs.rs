@@ -1,7 +1,7 @@
 //! Costs of hypotheses over the views of a pixel.
 
 use super::*;
-use crate::ambc::food::fitness;
+use crate::ambc::food_source::fitness;
 use crate::image::{PackedImage, Picture};
 use crate::testing::window;
 
@@ -9,8 +9,15 @@ use crate::testing::window;
 fn the_wall_costs_less_than_planes_before_and_behind_it() {
     let (world, window) = (World::five(), window());
     let reference = world.reference();
-    for aggregation in [Aggregation::AllViews, Aggregation::BestViews(3)] {
-        let mut evaluator = standing(&reference, &window, &Options { aggregation, ..options() }, false);
+    for best_views in [0, 3] {
+        let mut evaluator = standing(
+            &reference,
+            &window,
+            &changed(options(), |o| {
+                o.cost.best_views = best_views;
+            }),
+            false,
+        );
         let mut cost = |factor| evaluator.cost(&wall(&world, PIXEL, factor), f32::INFINITY);
         let right = cost(1.0);
         assert!(right < 0.03, "{right}");
@@ -26,34 +33,36 @@ fn a_cost_is_the_sum_over_all_but_one_or_the_mean_of_the_best() {
     let reference = world.reference();
     let food = wall(&world, PIXEL, 1.1);
     // Pairs of views give the costs of the single ones: (a + b) / 1.
-    let cost_of = |views: &[usize], aggregation| {
-        let options = Options { aggregation, ..options() };
+    let cost_of = |views: &[usize], best_views| {
+        let options = changed(options(), |o| {
+            o.cost.best_views = best_views;
+        });
         let mut evaluator = standing(&reference, &window, &options, false);
         let mut set = [0];
         views.iter().for_each(|&view| ViewSets::insert_into(&mut set, view));
         evaluator.go_to(PIXEL.0, PIXEL.1, &set);
         evaluator.cost(&food, f32::INFINITY)
     };
-    let pair = |a, b| cost_of(&[a, b], Aggregation::AllViews);
+    let pair = |a, b| cost_of(&[a, b], 0);
     let first = (pair(0, 1) + pair(0, 2) - pair(1, 2)) / 2.0;
     let mut single: Vec<f32> =
         (0..4).map(|view| if view == 0 { first } else { pair(0, view) - first }).collect();
     assert!(single.iter().all(|cost| (0.0..=2.0).contains(cost)), "{single:?}");
 
-    let all = cost_of(&[0, 1, 2, 3], Aggregation::AllViews);
+    let all = cost_of(&[0, 1, 2, 3], 0);
     assert!((all - single.iter().sum::<f32>() / 3.0).abs() < 1e-5);
     single.sort_by(f32::total_cmp);
     for best in 1..=4 {
         let mean = single[..best].iter().sum::<f32>() / best as f32;
-        let cost = cost_of(&[0, 1, 2, 3], Aggregation::BestViews(best as u32));
+        let cost = cost_of(&[0, 1, 2, 3], best as u32);
         assert!((cost - mean).abs() < 1e-5, "the best {best}: {cost} instead of {mean}");
     }
     // More than there are: those there are.
-    let cost = cost_of(&[0, 1, 2, 3], Aggregation::BestViews(8));
+    let cost = cost_of(&[0, 1, 2, 3], 8);
     assert!((cost - single.iter().sum::<f32>() / 4.0).abs() < 1e-5);
-    for aggregation in [Aggregation::AllViews, Aggregation::BestViews(1)] {
-        assert_eq!(cost_of(&[1], aggregation), f32::INFINITY);
-        assert_eq!(cost_of(&[], aggregation), f32::INFINITY);
+    for best_views in [0, 1] {
+        assert_eq!(cost_of(&[1], best_views), f32::INFINITY);
+        assert_eq!(cost_of(&[], best_views), f32::INFINITY);
     }
 }
 
@@ -61,8 +70,15 @@ fn a_cost_is_the_sum_over_all_but_one_or_the_mean_of_the_best() {
 fn giving_up_early_changes_no_decision() {
     let (world, window) = (World::five(), window());
     let reference = world.reference();
-    for aggregation in [Aggregation::AllViews, Aggregation::BestViews(2), Aggregation::BestViews(4)] {
-        let mut evaluator = standing(&reference, &window, &Options { aggregation, ..options() }, false);
+    for best_views in [0, 2, 4] {
+        let mut evaluator = standing(
+            &reference,
+            &window,
+            &changed(options(), |o| {
+                o.cost.best_views = best_views;
+            }),
+            false,
+        );
         for factor in [0.7, 0.9, 0.99, 1.0, 1.05, 1.4] {
             let food = wall(&world, PIXEL, factor);
             let cost = evaluator.cost(&food, f32::INFINITY);
@@ -71,7 +87,7 @@ fn giving_up_early_changes_no_decision() {
                 assert_eq!(evaluator.cost(&food, bound), expected);
             }
         }
-        assert!(evaluator.counts.early_outs > 0);
+        assert!(evaluator.counts.early_terminations > 0);
     }
 }
 
@@ -80,7 +96,9 @@ fn a_view_without_the_hypothesis_in_its_image_does_not_count() {
     // The third camera sees another part of the world.
     let mut world = World::new(&[0.0, 0.8, -0.8, 0.4], (36, 28));
     let window = window();
-    let options = Options { aggregation: Aggregation::BestViews(8), ..options() };
+    let options = changed(options(), |o| {
+        o.cost.best_views = 8;
+    });
     let cost = |world: &World| {
         let reference = world.reference();
         let mut evaluator = standing(&reference, &window, &options, false);
@@ -95,13 +113,12 @@ fn a_view_without_the_hypothesis_in_its_image_does_not_count() {
 #[test]
 fn disagreeing_with_validated_depths_costs_up_to_a_limit() {
     let (mut world, window) = (World::five(), window());
-    let options = Options {
-        aggregation: Aggregation::BestViews(8),
-        geometric_weight: 0.6,
-        geometric_limit: 3.0,
-        geometric_unknown: 1.5,
-        ..options()
-    };
+    let options = changed(options(), |o| {
+        o.cost.best_views = 8;
+        o.cost.geom_consistency_weight = 0.6;
+        o.cost.geom_consistency_max_error = 0.03;
+        o.cost.geom_consistency_missing_error = 0.015;
+    });
     let penalty = |world: &World, factor| {
         let reference = world.reference();
         let food = wall(world, PIXEL, factor);
@@ -143,7 +160,7 @@ fn a_pixel_focuses_on_the_views_whose_surfaces_agree_and_without_them_on_those_t
         (set[0], evaluator.counts.ncc_evaluations)
     };
     // One image shows something else.
-    world.images[2] = PackedImage::new(&Picture::from_grey(36, 28, vec![7; 36 * 28]).unwrap());
+    world.images[2] = PackedImage::new(&Picture::from_gray(36, 28, vec![7; 36 * 28]).unwrap());
     assert_eq!(focused(&world, false, &food), (0b1101, 4 + 3));
     // One surface lies elsewhere: it is known without looking at any image.
     for view in 1..5 {

@@ -2,28 +2,32 @@
 
 mod bees;
 mod costs;
-mod fitted;
+mod local_plane;
 mod planes;
 mod search;
 
 use super::cost::Evaluator;
 use super::{CostRules, FoodSource};
-use crate::kernels::Window;
-use crate::options::{Aggregation, Options};
+use crate::geometry::ViewSets;
+use crate::matching::Problem;
+use crate::matching::Window;
+use crate::options::Options;
 use crate::simd::Scalar;
+use crate::testing::changed;
 use crate::testing::{self, World};
-use crate::views::{Reference, ViewSets};
 
 /// A pixel that all views see.
 const PIXEL: (usize, usize) = (18, 14);
 
 fn options() -> Options {
-    Options { aggregation: Aggregation::BestViews(3), ..Options::default() }
+    changed(Options::default(), |o| {
+        o.cost.best_views = 3;
+    })
 }
 
 /// An evaluator that stands at the pixel with all sources in its set.
 fn standing<'a>(
-    reference: &'a Reference<'a>,
+    reference: &'a Problem<'a>,
     window: &'a Window,
     options: &Options,
     with_geometric_term: bool,

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::ambc::random::Random;
+use crate::matching::SourceProjector;
 use crate::simd::Scalar;
-use crate::views::Placements;
 use glam::Vec3;
 
 #[test]
@@ -55,10 +55,10 @@ fn a_validated_plane_shown_by_a_source_is_the_wall_between_its_pixels_too() {
     state.mark(&world.cameras[1], &validated);
     world.surfaces[1] = state.surface;
     let reference = world.reference();
-    let mut placements = Placements::new(Scalar, &reference);
-    placements.go_to(0.0, 0.0, &[0b11]);
-    let group = &placements.groups()[0];
-    let mut at = group.place(Scalar, 5.0);
+    let mut projector = SourceProjector::new(Scalar, &reference);
+    projector.set_pixel_and_views(0.0, 0.0, &[0b11]);
+    let group = &projector.groups()[0];
+    let mut at = group.project(Scalar, 5.0);
     at.column[..2].fill(10.4);
     at.row[..2].fill(7.7);
     let shown = group.surfaces(Scalar, &at);

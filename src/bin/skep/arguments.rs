@@ -1,7 +1,7 @@
 //! The words of the command line and the help that teaches them.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use skep::{DepthRange, Options, Result, Scale};
+use skep::{DepthRange, Options, Result};
 use std::path::PathBuf;
 
 #[derive(Parser)]
@@ -19,8 +19,8 @@ pub enum Command {
     /// Fuse depth and normal maps that are already there, from skep or from COLMAP
     #[command(after_help = FUSE_HELP)]
     Fuse(Fuse),
-    /// Show version, instruction set, threads and every option of the presets
-    Info,
+    /// Show version, instruction set, threads and every option of the presets, or explain one option
+    Info(Info),
 }
 
 #[derive(Args)]
@@ -46,45 +46,23 @@ pub struct Reconstruct {
     /// Leave parts of the method out, separated by commas
     #[arg(long, value_name = "PARTS", value_delimiter = ',')]
     without: Vec<Part>,
-    /// Set an option of the preset; `skep info` lists names and values. May be repeated
+    /// Set an option of the preset; `skep info` lists names and values, `skep info NAME` explains one. May be repeated
     #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
-    set: Vec<(String, f64)>,
-    /// Scales to search instead of the preset's, coarsest first, the last at full size: 2:4:6+3x1 is half size with
-    /// 4 food sources a pixel, 6 iterations in the first cycle and 3 more cycles of 1. May be repeated
-    #[arg(long, value_name = "SCALE", value_parser = scale)]
-    scale: Vec<Scale>,
+    set: Vec<(String, String)>,
+    /// Scales to search instead of the preset's, from coarse to fine, the last at full size, such as 'downscale=2
+    /// food_sources=3 iterations=5+4x1; downscale=1 food_sources=2 iterations=1+2x1': half size with 3 food sources a
+    /// pixel, 5 iterations in the first cycle and 4 more cycles of 1, then full size
+    #[arg(long, value_name = "SCALES")]
+    schedule: Option<String>,
     /// Print warnings and errors only
     #[arg(short, long)]
     pub quiet: bool,
 }
 
 /// `NAME=VALUE`.
-fn setting(text: &str) -> std::result::Result<(String, f64), String> {
-    let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE, such as reward=0.1")?;
-    let value = value.trim().parse().map_err(|_| format!("{value:?} is not a number"))?;
-    Ok((name.trim().to_owned(), value))
-}
-
-/// `REDUCTION:FOODS:FIRST+CYCLESxITERATIONS`.
-fn scale(text: &str) -> std::result::Result<Scale, String> {
-    let parsed = || {
-        let mut parts = text.split([':', '+', 'x']).map(|part| part.parse::<u32>().ok());
-        let mut next = || parts.next().flatten();
-        let [reduction, foods, first_iterations, cycles, cycle_iterations] =
-            [next()?, next()?, next()?, next()?, next()?];
-        let halvings = reduction.is_power_of_two().then(|| reduction.trailing_zeros())?;
-        parts.next().is_none().then_some(Scale {
-            halvings,
-            foods,
-            first_iterations,
-            cycles,
-            cycle_iterations,
-        })
-    };
-    parsed().ok_or_else(|| {
-        "expected REDUCTION:FOODS:FIRST+CYCLESxITERATIONS with a power of two first, such as 2:4:6+3x1"
-            .to_owned()
-    })
+fn setting(text: &str) -> std::result::Result<(String, String), String> {
+    let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE, such as smoothness_reward=0.1")?;
+    Ok((name.trim().to_owned(), value.trim().to_owned()))
 }
 
 /// A part of the method that can be left out.
@@ -92,10 +70,16 @@ fn scale(text: &str) -> std::result::Result<Scale, String> {
 enum Part {
     /// Incidence and visibility do not refine the view set of a pixel
     ViewSelection,
-    /// Planes of validated neighbours are not favoured
+    /// Planes of validated neighbors are not favored
     Reward,
     /// Consistent solutions are not offered to other views
     Propagation,
+}
+
+#[derive(Args)]
+pub struct Info {
+    /// An option, with or without its group
+    pub option: Option<String>,
 }
 
 #[derive(Args)]
@@ -126,16 +110,16 @@ impl Reconstruct {
         options.seed = self.seed;
         for part in &self.without {
             match part {
-                Part::ViewSelection => options.view_selection = false,
-                Part::Reward => options.reward = 0.0,
-                Part::Propagation => options.propagation = false,
+                Part::ViewSelection => options.view_selection.pixelwise_view_selection = false,
+                Part::Reward => options.search.smoothness_reward = 0.0,
+                Part::Propagation => options.search.view_propagation = false,
             }
         }
         for (name, value) in &self.set {
-            options.set(name, *value)?;
+            options.set(name, value)?;
         }
-        if !self.scale.is_empty() {
-            options.scales.clone_from(&self.scale);
+        if let Some(scales) = &self.schedule {
+            options.set("schedule.scales", scales)?;
         }
         Ok(options)
     }
@@ -166,13 +150,13 @@ Exit status: 0 done, 1 failed, 2 wrong arguments, 130 interrupted (Ctrl-C).";
 
 const RECONSTRUCT_HELP: &str = "\
 The scene:
-  images/              photographs, PNG or JPEG, colour or grey
+  images/              photographs, PNG or JPEG, color or gray
   sparse/, sparse/0/   COLMAP model, text or binary, cameras PINHOLE or SIMPLE_PINHOLE
   This is what `colmap image_undistorter` writes; run it first when lenses distort:
     colmap image_undistorter --image_path IMAGES --input_path MODEL --output_path SCENE
 
 What it makes, in COLMAP's layouts:
-  fused.ply                        the cloud: position, normal, colour
+  fused.ply                        the cloud: position, normal, color
   fused.ply.vis                    the views each point was seen in
   preview/NAME.depth.png           pictures to look at first: depth, normal and number of
           NAME.normal.png          source views of each pixel; black where nothing was found

@@ -52,7 +52,7 @@ fn fuse_maps(maps: &WorkspaceMaps, display: Display, interrupt: &Interrupt) -> s
         .map(|(view, overlap)| FusionView {
             camera: &view.camera,
             maps: &view.maps,
-            outcome: None,
+            status: None,
             picture: view.picture.as_ref(),
             overlap,
         })

@@ -1,15 +1,19 @@
-//! `skep info`: what this build and machine offer, and what the presets hold.
+//! `skep info`: what this build and machine offer, what the presets hold, and what each option does.
 
-use crate::streams;
+use crate::arguments::Info;
+use crate::{Failure, streams};
 use skep::Options;
-use skep::simd::Level;
+use skep::simd::SimdLevel;
 
-/// Prints it all.
-pub fn run() {
-    let version = env!("CARGO_PKG_VERSION");
-    let level = Level::detect().name();
-    streams::result(&format!("skep {version}\nSIMD level: {level}\nthreads: {}\n", cores()));
-    preset_table().iter().for_each(|line| streams::result(line));
+/// Runs the command.
+pub fn run(arguments: &Info) -> Result<(), Failure> {
+    match &arguments.option {
+        Some(name) => explain(name),
+        None => {
+            list();
+            Ok(())
+        }
+    }
 }
 
 /// The threads that `--threads 0` takes.
@@ -17,27 +21,46 @@ pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// A row for each option, a column for each preset.
+/// Version, machine and all options.
+fn list() {
+    let version = env!("CARGO_PKG_VERSION");
+    let level = SimdLevel::detect().name();
+    streams::result(&format!("skep {version}\nSIMD level: {level}\nthreads: {}\n", cores()));
+    preset_table().iter().for_each(|line| streams::result(line));
+    streams::result("\nskep info NAME explains an option; skep reconstruct --set NAME=VALUE sets it.");
+}
+
+/// What one option does, and its values in the presets.
+fn explain(name: &str) -> Result<(), Failure> {
+    let info = Options::info(name).map_err(Failure::Usage)?;
+    streams::result(&format!("{}: {}", info.name, info.explanation));
+    streams::result(&format!("  unit    {}\n  values  {}", info.unit, info.kind));
+    for preset in Options::PRESETS {
+        let value = Options::preset(preset)?.get(info.name)?;
+        streams::result(&format!("  {preset:<7} {value}"));
+    }
+    Ok(())
+}
+
+/// A row for each option, a column for each preset; a value of several parts takes a line for each.
 fn preset_table() -> Vec<String> {
-    let presets: Vec<Vec<(&str, String)>> = (Options::PRESETS.iter())
-        .map(|name| Options::preset(name).expect("presets are found by their names").entries())
-        .collect();
-    let mut lines = row("option", &Options::PRESETS);
-    for (place, (name, _)) in presets[0].iter().enumerate() {
-        let values: Vec<&str> = presets.iter().map(|entries| entries[place].1.as_str()).collect();
-        lines.extend(row(name, &values));
+    let presets =
+        Options::PRESETS.map(|name| Options::preset(name).expect("presets are found by their names"));
+    let mut lines = row("option", &Options::PRESETS.map(str::to_owned));
+    for info in Options::infos() {
+        let value = |options: &Options| options.get(info.name).expect("it is listed").to_string();
+        lines.extend(row(info.name, &presets.each_ref().map(value)));
     }
     lines
 }
 
-/// The lines of one row: a value of several parts takes a line for each.
-fn row(name: &str, values: &[&str]) -> Vec<String> {
+fn row(name: &str, values: &[String]) -> Vec<String> {
     let parts: Vec<Vec<&str>> = values.iter().map(|value| value.split("; ").collect()).collect();
     let count = parts.iter().map(Vec::len).max().unwrap_or(0);
     let line = |index: usize| {
-        let mut line = format!("{:<24}", if index == 0 { name } else { "" });
+        let mut line = format!("{:<42}", if index == 0 { name } else { "" });
         for parts in &parts {
-            line += &format!("{:<34}", parts.get(index).unwrap_or(&""));
+            line += &format!("{:<48}", parts.get(index).unwrap_or(&""));
         }
         line.trim_end().to_owned()
     };

@@ -26,10 +26,7 @@ fn main() -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Reconstruct(arguments) => reconstruct::run(&arguments),
         Command::Fuse(arguments) => fuse::run(&arguments),
-        Command::Info => {
-            info::run();
-            Ok(())
-        }
+        Command::Info(arguments) => info::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -70,7 +70,7 @@ impl Follower {
     pub fn show(&self, progress: &Progress) {
         let Ok(mut last) = self.last.try_lock() else { return };
         let shown = Shown {
-            step: (progress.phase, progress.reduction, progress.cycle),
+            step: (progress.phase, progress.downscale, progress.cycle),
             view: progress.view,
             bar_steps: (progress.done * BAR_STEPS) as u64,
         };
@@ -118,10 +118,10 @@ fn line(progress: &Progress, elapsed: Duration) -> String {
 
 fn step(progress: &Progress) -> String {
     let phase = progress.phase.name();
-    match (progress.phase, progress.reduction) {
+    match (progress.phase, progress.downscale) {
         (Phase::Fusion, _) => phase.to_owned(),
         (_, 1) => format!("{phase} at full size, cycle {}", progress.cycle + 1),
-        (_, reduction) => format!("{phase} at 1/{reduction} size, cycle {}", progress.cycle + 1),
+        (_, downscale) => format!("{phase} at 1/{downscale} size, cycle {}", progress.cycle + 1),
     }
 }
 
@@ -143,7 +143,7 @@ mod tests {
     use super::*;
 
     const QUARTER_DONE: Progress =
-        Progress { phase: Phase::Search, reduction: 2, cycle: 0, view: 2, views: 7, done: 0.25 };
+        Progress { phase: Phase::Search, downscale: 2, cycle: 0, view: 2, views: 7, done: 0.25 };
 
     #[test]
     fn the_time_left_comes_from_the_share_done_and_the_time_it_took() {

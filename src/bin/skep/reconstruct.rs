@@ -8,7 +8,7 @@ use crate::stopwatch::{Stage, Stopwatch};
 use crate::{Failure, streams};
 use rayon::prelude::*;
 use skep::io::{SceneFolder, Workspace, read_scene};
-use skep::{Error, Options, Outcome, Progress, Reconstruction, Result, Scene};
+use skep::{Error, Options, PixelStatus, Progress, Reconstruction, Result, Scene};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -130,7 +130,7 @@ fn explain_interruption(error: &Error, kept: &str) {
 /// The last lines: what was made and where to look first, or why there is nothing to see.
 fn summary(output: &Path, scene: &Scene, totals: &Totals) -> Vec<String> {
     let workspace = Workspace::new(output);
-    let validated = share(totals, Outcome::Validated);
+    let validated = share(totals, PixelStatus::Validated);
     let mut lines = vec![
         format!("{} views, {validated:.1} % of {} pixels validated", scene.views().len(), totals.pixels),
         format!("{} points in {}", totals.points, workspace.cloud().display()),
@@ -139,7 +139,7 @@ fn summary(output: &Path, scene: &Scene, totals: &Totals) -> Vec<String> {
         lines.extend(reasons(totals));
     }
     let first = &scene.views()[0].name;
-    lines.push(format!("look at {} and its neighbours first", workspace.preview(first, "depth").display()));
+    lines.push(format!("look at {} and its neighbors first", workspace.preview(first, "depth").display()));
     lines.push(format!("maps in {}", output.join("stereo").display()));
     lines.push(format!("counts and times in {}", report_path(output).display()));
     lines.push(format!("done in {:.1} s", totals.wall_seconds));
@@ -149,17 +149,17 @@ fn summary(output: &Path, scene: &Scene, totals: &Totals) -> Vec<String> {
 /// Why the cloud is empty: how many pixels were dropped for which reason, and what would help.
 fn reasons(totals: &Totals) -> Vec<String> {
     let help = |outcome| match outcome {
-        Outcome::Validated => {
+        PixelStatus::Validated => {
             "confirmed, but in fewer views than fusion asks for: more views of each surface"
         }
-        Outcome::Masked => "left out by their mask",
-        Outcome::NoTexture => "too uniform to be matched: more texture or light",
-        Outcome::NoSources => "seen by fewer than two other views: more overlap between photographs",
-        Outcome::Inconsistent => "other views disagree: check the calibration and that nothing moved",
-        Outcome::OutOfRange => "at an end of the depth range: try --depth-range MIN MAX with a wider one",
+        PixelStatus::Masked => "left out by their mask",
+        PixelStatus::NoTexture => "too uniform to be matched: more texture or light",
+        PixelStatus::NoSources => "seen by fewer than two other views: more overlap between photographs",
+        PixelStatus::Inconsistent => "other views disagree: check the calibration and that nothing moved",
+        PixelStatus::OutOfRange => "at an end of the depth range: try --depth-range MIN MAX with a wider one",
     };
     let mut lines = vec!["the cloud is empty; what became of the pixels:".to_owned()];
-    for outcome in Outcome::ALL.into_iter().filter(|outcome| totals.outcomes[outcome.name()] > 0) {
+    for outcome in PixelStatus::ALL.into_iter().filter(|outcome| totals.outcomes[outcome.name()] > 0) {
         let (name, share) = (outcome.name(), share(totals, outcome));
         lines.push(format!("  {} ({share:.1} %) {name}: {}", totals.outcomes[name], help(outcome)));
     }
@@ -167,7 +167,7 @@ fn reasons(totals: &Totals) -> Vec<String> {
 }
 
 /// Percentage of the pixels with this outcome.
-fn share(totals: &Totals, outcome: Outcome) -> f64 {
+fn share(totals: &Totals, outcome: PixelStatus) -> f64 {
     totals.outcomes[outcome.name()] as f64 * 100.0 / totals.pixels.max(1) as f64
 }
 
@@ -178,7 +178,7 @@ mod tests {
     #[test]
     fn an_empty_cloud_is_explained_by_the_reasons_that_occurred() {
         let counts = [0, 0, 300, 0, 700, 0];
-        let outcomes = Outcome::ALL.iter().map(|outcome| outcome.name()).zip(counts).collect();
+        let outcomes = PixelStatus::ALL.iter().map(|outcome| outcome.name()).zip(counts).collect();
         let lines = reasons(&Totals { pixels: 1000, outcomes, ..Totals::default() });
         assert_eq!(lines.len(), 3, "{lines:?}");
         assert!(lines[1].starts_with("  300 (30.0 %) no_texture: "), "{}", lines[1]);

@@ -3,8 +3,11 @@
 use crate::info;
 use crate::stopwatch::Times;
 use serde::Serialize;
-use skep::simd::Level;
-use skep::{Counts, CycleRecord, Options, Outcome, Reconstruction, Result, Scene, ViewResult};
+use serde_json::Value;
+use skep::simd::SimdLevel;
+use skep::{
+    Counts, CycleRecord, OptionValue, Options, PixelStatus, Reconstruction, Result, Scene, ViewResult,
+};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
@@ -16,7 +19,7 @@ pub struct Report {
     simd: &'static str,
     threads: usize,
     preset: String,
-    options: BTreeMap<&'static str, String>,
+    options: BTreeMap<&'static str, Value>,
     warnings: Vec<String>,
     pub totals: Totals,
     phases: Times,
@@ -29,8 +32,8 @@ pub struct Totals {
     pub pixels: u64,
     pub outcomes: BTreeMap<&'static str, u64>,
     pub ncc_evaluations: u64,
-    pub samples: u64,
-    pub early_outs: u64,
+    pub bilinear_samples: u64,
+    pub early_terminations: u64,
     pub cycles: Vec<CycleReport>,
     pub points: usize,
     pub wall_seconds: f64,
@@ -44,20 +47,20 @@ struct ViewReport {
     width: u32,
     height: u32,
     pixels: u64,
-    near: f64,
-    far: f64,
+    depth_min: f64,
+    depth_max: f64,
     sources: Vec<String>,
     outcomes: BTreeMap<&'static str, u64>,
     ncc_evaluations: u64,
-    samples: u64,
-    early_outs: u64,
+    bilinear_samples: u64,
+    early_terminations: u64,
     cycles: Vec<CycleReport>,
 }
 
 /// A cycle of one view, or of all views together.
 #[derive(Serialize)]
 pub struct CycleReport {
-    reduction: u32,
+    downscale: u32,
     cycle: u32,
     pixels: u64,
     changed: u64,
@@ -71,10 +74,10 @@ impl Report {
             result.views.iter().enumerate().map(|(index, view)| view_report(scene, index, view)).collect();
         Report {
             version: env!("CARGO_PKG_VERSION"),
-            simd: options.simd.unwrap_or_else(Level::detect).name(),
+            simd: options.simd.unwrap_or_else(SimdLevel::detect).name(),
             threads: if options.threads == 0 { info::cores() } else { options.threads },
             preset: preset.to_owned(),
-            options: options.entries().into_iter().collect(),
+            options: options.values().map(|(name, value)| (name, typed(value))).collect(),
             warnings: result.warnings.clone(),
             totals: totals(scene, result),
             phases: Times::default(),
@@ -100,13 +103,23 @@ impl Report {
     }
 }
 
+/// The value of an option as JSON has it.
+fn typed(value: OptionValue) -> Value {
+    match value {
+        OptionValue::Count(value) => value.into(),
+        OptionValue::Number(value) => value.into(),
+        OptionValue::Switch(value) => value.into(),
+        OptionValue::Text(value) => value.into(),
+    }
+}
+
 fn totals(scene: &Scene, result: &Reconstruction) -> Totals {
     let mut counts = Counts::default();
-    let mut outcomes = [0; Outcome::ALL.len()];
+    let mut outcomes = [0; PixelStatus::ALL.len()];
     let mut cycles: Vec<CycleRecord> = Vec::new();
     for view in &result.views {
         counts += view.counts;
-        for (total, count) in outcomes.iter_mut().zip(view.outcome_counts()) {
+        for (total, count) in outcomes.iter_mut().zip(view.status_counts()) {
             *total += count;
         }
         for cycle in &view.cycles {
@@ -114,13 +127,13 @@ fn totals(scene: &Scene, result: &Reconstruction) -> Totals {
         }
     }
     // Coarse to fine: the order in which a run goes through them.
-    cycles.sort_by_key(|cycle| (std::cmp::Reverse(cycle.reduction), cycle.cycle));
+    cycles.sort_by_key(|cycle| (std::cmp::Reverse(cycle.downscale), cycle.cycle));
     Totals {
         pixels: scene.views().iter().map(|view| view.camera.pixels() as u64).sum(),
         outcomes: by_name(outcomes),
         ncc_evaluations: counts.ncc_evaluations,
-        samples: counts.samples,
-        early_outs: counts.early_outs,
+        bilinear_samples: counts.bilinear_samples,
+        early_terminations: counts.early_terminations,
         cycles: cycles.iter().map(CycleReport::from).collect(),
         points: result.points.positions.len(),
         wall_seconds: 0.0,
@@ -131,7 +144,7 @@ fn totals(scene: &Scene, result: &Reconstruction) -> Totals {
 
 /// Adds a view's cycle to the one of the same scale and number.
 fn add_cycle(cycles: &mut Vec<CycleRecord>, cycle: &CycleRecord) {
-    let same = |total: &&mut CycleRecord| (total.reduction, total.cycle) == (cycle.reduction, cycle.cycle);
+    let same = |total: &&mut CycleRecord| (total.downscale, total.cycle) == (cycle.downscale, cycle.cycle);
     match cycles.iter_mut().find(same) {
         Some(total) => {
             total.pixels += cycle.pixels;
@@ -150,25 +163,25 @@ fn view_report(scene: &Scene, index: usize, result: &ViewResult) -> ViewReport {
         width: view.camera.width,
         height: view.camera.height,
         pixels: view.camera.pixels() as u64,
-        near: range.near,
-        far: range.far,
+        depth_min: range.near,
+        depth_max: range.far,
         sources: result.sources.iter().map(|&source| scene.views()[source as usize].name.clone()).collect(),
-        outcomes: by_name(result.outcome_counts()),
+        outcomes: by_name(result.status_counts()),
         ncc_evaluations: result.counts.ncc_evaluations,
-        samples: result.counts.samples,
-        early_outs: result.counts.early_outs,
+        bilinear_samples: result.counts.bilinear_samples,
+        early_terminations: result.counts.early_terminations,
         cycles: result.cycles.iter().map(CycleReport::from).collect(),
     }
 }
 
-fn by_name(counts: [u64; Outcome::ALL.len()]) -> BTreeMap<&'static str, u64> {
-    Outcome::ALL.iter().map(|outcome| outcome.name()).zip(counts).collect()
+fn by_name(counts: [u64; PixelStatus::ALL.len()]) -> BTreeMap<&'static str, u64> {
+    PixelStatus::ALL.iter().map(|outcome| outcome.name()).zip(counts).collect()
 }
 
 impl From<&CycleRecord> for CycleReport {
     fn from(cycle: &CycleRecord) -> CycleReport {
-        let &CycleRecord { reduction, cycle, pixels, changed, validated } = cycle;
-        CycleReport { reduction, cycle, pixels, changed, validated }
+        let &CycleRecord { downscale, cycle, pixels, changed, validated } = cycle;
+        CycleReport { downscale, cycle, pixels, changed, validated }
     }
 }
 

@@ -80,7 +80,7 @@ fn name(file: &mut FileReader) -> Result<String> {
 fn point(file: &mut FileReader, _: &Path) -> Result<PointRecord> {
     let id = file.u64("a point's id")?;
     let position = file.f64s("a point's position")?;
-    file.bytes::<3>("a point's colour")?;
+    file.bytes::<3>("a point's color")?;
     file.bytes::<8>("a point's error")?;
     let length = file.u64("a track's length")?;
     file.require(length, TRACK_BYTES, "a point's track")?;

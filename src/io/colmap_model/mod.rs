@@ -4,8 +4,8 @@ mod binary;
 mod records;
 mod text;
 
-use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::geometry::Camera;
 use crate::scene::SparsePoint;
 use records::Files;
 use std::path::Path;
@@ -15,7 +15,7 @@ use std::path::Path;
 pub struct ModelImage {
     /// The image's path below the folder of images, parts separated by `/`.
     pub name: String,
-    /// Calibration and pose, in the crate's convention (COLMAP's pixel centres lie half a pixel further).
+    /// Calibration and pose, in the crate's convention (COLMAP's pixel centers lie half a pixel further).
     pub camera: Camera,
 }
 
@@ -24,7 +24,7 @@ pub struct ModelImage {
 pub struct ColmapModel {
     /// The images in the order of the file, which is what consistency graphs and `fused.ply.vis` count along.
     pub images: Vec<ModelImage>,
-    /// The points, with the indices of the images that saw them in ascending order. Their colours and errors and
+    /// The points, with the indices of the images that saw them in ascending order. Their colors and errors and
     /// the images' features are not kept.
     pub points: Vec<SparsePoint>,
 }
@@ -53,7 +53,7 @@ impl ColmapModel {
     }
 
     /// Writes `cameras.txt`, `images.txt` and `points3D.txt`. Points get the projections of their positions as
-    /// features, grey as colour and 0 as error.
+    /// features, gray as color and 0 as error.
     ///
     /// # Panics
     /// A point names an image there is not.

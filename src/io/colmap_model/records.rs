@@ -1,8 +1,8 @@
 //! What the files of a model say before ids are resolved, and what is checked alike for text and binary.
 
 use super::{ColmapModel, ModelImage};
-use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::geometry::Camera;
 use crate::io::files::{NAME_INSIDE, stays_inside};
 use crate::scene::SparsePoint;
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -10,7 +10,7 @@ use std::collections::{HashMap, HashSet};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-/// COLMAP puts the centre of the top-left pixel at (0.5, 0.5), the crate at (0, 0).
+/// COLMAP puts the center of the top-left pixel at (0.5, 0.5), the crate at (0, 0).
 const HALF_PIXEL: f64 = 0.5;
 
 /// COLMAP's camera models in the order of their numbers in binary files.
@@ -188,7 +188,7 @@ impl Records {
 }
 
 impl CameraRecord {
-    /// The camera, not placed yet.
+    /// The camera, not projections yet.
     fn camera(&self, place: &Place) -> Result<Camera> {
         let side = |side: u64| u32::try_from(side).unwrap_or(u32::MAX);
         let [fx, fy, cx, cy] = self.parameters;

@@ -8,10 +8,10 @@ Calibrated photographs go in; depth, normal and source-view maps and a fused poi
     result = skep.reconstruct(scene, progress=lambda progress: print(f"{progress.done:.0%}"))
     depth, points = result[0].depth, result.cloud.positions
 
-There are three levels, which can be mixed: whole runs (`reconstruct`), a run taken apart (`Steps`), and kernels
+There are three levels, which can be mixed: whole runs (`reconstruct`), a run taken apart (`Stepper`), and kernels
 (`plane_homographies`, `patch_ncc`).
 
-What holds everywhere: x_cam = R x_world + t with x right, y down, z forward; depth is z; the centre of the top-left
+What holds everywhere: x_cam = R x_world + t with x right, y down, z forward; depth is z; the center of the top-left
 pixel is (0, 0). Arrays that go in are copied, or only read during the call. The same input, options and version give
 the same bits. Calls release the interpreter's lock, and any function may be called from any thread.
 """
@@ -27,21 +27,21 @@ from ._files import (
     write_depth_map,
     write_normal_map,
 )
-from ._kernels import Samples, Window, patch_ncc, plane_homographies, plane_through
+from ._kernels import PackedImage, Window, patch_ncc, plane_homographies, plane_through
 from ._native import ffi as _ffi, lib as _lib
 from ._options import Options, Scale
 from ._pycolmap import from_pycolmap
-from ._result import Cycle, Outcome, Result, ResultView, Statistics, reconstruct
+from ._result import Cycle, PixelStatus, Result, ResultView, Statistics, reconstruct
 from ._run import Phase, Progress
 from ._scene import Scene
-from ._steps import Offers, State, StateInfo, StateMaps, Step, Steps
+from ._stepper import Candidates, Estimate, StateInfo, StateMaps, Cycle, Stepper
 
 __version__: str = _ffi.string(_lib.skep_version()).decode()
 
 
 def backend_name() -> str:
     """The instruction set of runs: "scalar", "base" or "v3" (AVX2). Results do not depend on it."""
-    name: str = _ffi.string(_lib.skep_backend_name()).decode()
+    name: str = _ffi.string(_lib.skep_simd_level_name()).decode()
     return name
 
 
@@ -56,23 +56,23 @@ __all__ = [
     "FileError",
     "FusionView",
     "InternalError",
-    "Offers",
+    "Candidates",
     "Options",
-    "Outcome",
+    "PixelStatus",
     "Phase",
     "Progress",
     "Result",
     "ResultView",
-    "Samples",
+    "PackedImage",
     "Scale",
     "Scene",
-    "State",
+    "Estimate",
     "StateError",
     "StateInfo",
     "StateMaps",
     "Statistics",
-    "Step",
-    "Steps",
+    "Cycle",
+    "Stepper",
     "Window",
     "backend_name",
     "from_pycolmap",

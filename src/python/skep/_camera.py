@@ -15,7 +15,7 @@ from ._native import ffi
 class Camera:
     """A pinhole camera without distortion: x_cam = R x_world + t, with x right, y down, z forward.
 
-    `K` is [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], for pixels whose top-left centre is (0, 0), as in OpenCV; COLMAP's
+    `K` is [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], for pixels whose top-left center is (0, 0), as in OpenCV; COLMAP's
     principal points are half a pixel larger.
     """
 
@@ -35,10 +35,10 @@ class Camera:
             matrix.flags.writeable = False
 
     @property
-    def centre(self) -> NDArray[np.float64]:
+    def center(self) -> NDArray[np.float64]:
         """Where the camera stands in the world."""
-        centre: NDArray[np.float64] = -self.R.T @ self.t
-        return centre
+        center: NDArray[np.float64] = -self.R.T @ self.t
+        return center
 
     def __repr__(self) -> str:
         return f"Camera(K={self.K.tolist()}, R={self.R.tolist()}, t={self.t.tolist()})"

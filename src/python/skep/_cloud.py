@@ -55,7 +55,7 @@ class Cloud:
         return self._points(1, np.float32)
 
     @cached_property
-    def colours(self) -> NDArray[np.uint8]:
+    def colors(self) -> NDArray[np.uint8]:
         """Red, green and blue of each point; 128 where no picture was given."""
         return self._points(2, np.uint8)
 
@@ -90,7 +90,7 @@ class FusionView:
     normal: NDArray[Any]
     """float32, (height, width, 3), in the camera frame."""
     image: NDArray[Any] | None = None
-    """For the colours, of the maps' size; None gives grey points."""
+    """For the colors, of the maps' size; None gives gray points."""
     overlap: Iterable[int] | None = None
     """The views that may see the same surface, as `Scene.overlap` tells; None is all the others."""
     order: Order = "rgb"

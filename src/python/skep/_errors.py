@@ -20,7 +20,7 @@ class ArgumentError(Error, ValueError):
 class StateError(Error, RuntimeError):
     """The object cannot be used any more: a call that was changing it failed inside the library."""
 
-    status = lib.SKEP_ERR_STATE
+    status = lib.SKEP_ERR_POISONED
 
 
 class Cancelled(Error):

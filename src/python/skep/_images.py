@@ -14,8 +14,8 @@ Order = Literal["rgb", "bgr"]
 """The order of an image's channels: as matplotlib, Pillow and imageio have it, or as OpenCV does."""
 
 _LAYOUTS = {
-    (1, "rgb"): lib.SKEP_FORMAT_GREY,
-    (1, "bgr"): lib.SKEP_FORMAT_GREY,
+    (1, "rgb"): lib.SKEP_FORMAT_GRAY,
+    (1, "bgr"): lib.SKEP_FORMAT_GRAY,
     (3, "rgb"): lib.SKEP_FORMAT_RGB,
     (3, "bgr"): lib.SKEP_FORMAT_BGR,
     (4, "rgb"): lib.SKEP_FORMAT_RGBA,

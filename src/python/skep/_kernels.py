@@ -38,7 +38,7 @@ def plane_homographies(reference: Camera, source: Camera, planes: ArrayLike) -> 
     return homographies
 
 
-class Samples:
+class PackedImage:
     """An image, copied into the layout the kernels sample. Never changes."""
 
     __slots__ = ("_handle",)
@@ -47,16 +47,16 @@ class Samples:
 
     def __init__(self, image: NDArray[Any], order: Order = "rgb") -> None:
         given = to_image(image, order)
-        out = ffi.new("skep_samples **")
-        check(lib.skep_samples_create(given.struct, out))
-        self._handle = ffi.gc(out[0], lib.skep_samples_destroy)
+        out = ffi.new("skep_packed_image **")
+        check(lib.skep_packed_image_create(given.struct, out))
+        self._handle = ffi.gc(out[0], lib.skep_packed_image_destroy)
 
 
 class Window:
     """A square window of half side `radius`, sampled every `step` pixels. Never changes.
 
-    A sample weighs exp(-r^2 / (2 spatial_sigma^2) - dI^2 / (2 colour_sigma^2)), r pixels and dI of grey from the
-    centre; infinite sigmas, the default, weigh all alike. A patch of less weighted variance than `min_variance` has no
+    A sample weighs exp(-r^2 / (2 sigma_spatial^2) - dI^2 / (2 sigma_color^2)), r pixels and dI of gray from the
+    center; infinite sigmas, the default, weigh all alike. A patch of less weighted variance than `min_variance` has no
     texture.
     """
 
@@ -68,26 +68,26 @@ class Window:
         self,
         radius: int = 5,
         step: int = 2,
-        spatial_sigma: float = math.inf,
-        colour_sigma: float = math.inf,
+        sigma_spatial: float = math.inf,
+        sigma_color: float = math.inf,
         min_variance: float = 1e-5,
     ) -> None:
-        out = ffi.new("skep_window **")
-        check(lib.skep_window_create(radius, step, spatial_sigma, colour_sigma, min_variance, out))
-        self._handle = ffi.gc(out[0], lib.skep_window_destroy)
+        out = ffi.new("skep_ncc_window **")
+        check(lib.skep_ncc_window_create(radius, step, sigma_spatial, sigma_color, min_variance, out))
+        self._handle = ffi.gc(out[0], lib.skep_ncc_window_destroy)
 
 
 def patch_ncc(
-    window: Window, reference: Samples, source: Samples, pixels: ArrayLike, homographies: ArrayLike
+    window: Window, reference: PackedImage, source: PackedImage, pixels: ArrayLike, homographies: ArrayLike
 ) -> NDArray[np.float32]:
-    """Normalised cross-correlations of patches around `pixels` (n, 2) of the reference, x before y, with their images
+    """Normalized cross-correlations of patches around `pixels` (n, 2) of the reference, x before y, with their images
     in the source by `homographies` (n, 3, 3): -1 to 1; -1 also where either side has no texture.
     """
-    centres = indices(np.asarray(pixels), "pixels")
+    centers = indices(np.asarray(pixels), "pixels")
     ways = doubles(homographies, (-1, 3, 3), "homographies")
-    if centres.shape != (len(ways), 2):
-        raise ArgumentError(f"pixels has shape {centres.shape}: must be ({len(ways)}, 2), one for each homography")
+    if centers.shape != (len(ways), 2):
+        raise ArgumentError(f"pixels has shape {centers.shape}: must be ({len(ways)}, 2), one for each homography")
     ncc = np.empty(len(ways), dtype=np.float32)
     samples = reference._handle, source._handle
-    check(lib.skep_patch_ncc(window._handle, *samples, pointer(centres), pointer(ways), len(ways), pointer(ncc)))
+    check(lib.skep_patch_ncc(window._handle, *samples, pointer(centers), pointer(ways), len(ways), pointer(ncc)))
     return ncc

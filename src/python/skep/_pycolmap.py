@@ -48,7 +48,7 @@ def _camera(camera: Any, image: Any) -> Camera:
         remedy = "must be PINHOLE or SIMPLE_PINHOLE, as pycolmap.undistort_images makes them"
         raise ArgumentError(f"camera {camera.camera_id} is {camera.model.name}: {remedy}")
     K = np.array(camera.calibration_matrix())
-    # COLMAP has the centre of the top-left pixel at (0.5, 0.5).
+    # COLMAP has the center of the top-left pixel at (0.5, 0.5).
     K[:2, 2] -= 0.5
     world_to_camera = np.array(image.cam_from_world().matrix())
     return Camera(K, world_to_camera[:, :3], world_to_camera[:, 3])

@@ -25,7 +25,7 @@ from ._scene import Scene
 T = TypeVar("T")
 
 
-class Outcome(IntEnum):
+class PixelStatus(IntEnum):
     """What became of a pixel: the reason where there is no validated depth."""
 
     VALIDATED = lib.SKEP_PIXEL_VALIDATED
@@ -50,17 +50,17 @@ class Statistics:
     """Patches compared with a patch in one source view."""
     samples: int
     """Bilinear samples taken from source views."""
-    early_outs: int
+    early_terminations: int
     """Hypotheses given up before all their source views were looked at."""
-    pixels: Mapping[Outcome, int]
-    """Number of pixels of each outcome."""
+    pixels: Mapping[PixelStatus, int]
+    """Number of pixels of each status."""
 
 
 @dataclass(frozen=True)
 class Cycle:
     """One cycle's search of one view."""
 
-    reduction: int
+    downscale: int
     """Size of the images: 1 is full, 2 half, 4 a quarter."""
     cycle: int
     """The cycle on that scale, counted from 0."""
@@ -117,9 +117,9 @@ class ResultView:
         return self._borrow(lib.skep_result_borrow_cost, "float", np.float32)
 
     @cached_property
-    def outcome(self) -> NDArray[np.uint8]:
-        """What became of every pixel: values of `Outcome`."""
-        return self._borrow(lib.skep_result_borrow_outcome, "uint8_t", np.uint8)
+    def status(self) -> NDArray[np.uint8]:
+        """What became of every pixel: values of `PixelStatus`."""
+        return self._borrow(lib.skep_result_borrow_status, "uint8_t", np.uint8)
 
     @cached_property
     def validated_depth(self) -> NDArray[np.float32]:
@@ -155,17 +155,17 @@ class ResultView:
         """What the view cost and what became of its pixels."""
         found = ffi.new("skep_statistics *")
         check(lib.skep_result_get_statistics(self._handle, self.view, found))
-        pixels = {outcome: found.pixels[outcome] for outcome in Outcome}
-        return Statistics(found.ncc_evaluations, found.samples, found.early_outs, pixels)
+        pixels = {status: found.status_counts[status] for status in PixelStatus}
+        return Statistics(found.ncc_evaluations, found.samples, found.early_terminations, pixels)
 
     @cached_property
     def cycles(self) -> tuple[Cycle, ...]:
         """The cycles of the view in order."""
         count = ffi.new("size_t *")
         check(lib.skep_result_get_cycles(self._handle, self.view, ffi.NULL, 0, count))
-        found = ffi.new("skep_cycle[]", count[0])
+        found = ffi.new("skep_cycle_record[]", count[0])
         check(lib.skep_result_get_cycles(self._handle, self.view, found, count[0], count))
-        return tuple(Cycle(one.reduction, one.cycle, one.pixels, one.changed, one.validated) for one in found)
+        return tuple(Cycle(one.downscale, one.cycle, one.pixels, one.changed, one.validated) for one in found)
 
 
 class Result:

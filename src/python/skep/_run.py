@@ -32,7 +32,7 @@ class Progress:
     done: float
     """Share of the whole call that is done, 0 to 1."""
     phase: Phase
-    reduction: int
+    downscale: int
     """Size of the images searched: 1 is full, 2 half, 4 a quarter."""
     cycle: int
     """The cycle on this scale, counted from 0."""
@@ -77,7 +77,7 @@ class _Call:
             self.latest = Progress(
                 done=progress.done,
                 phase=Phase(progress.phase),
-                reduction=progress.reduction,
+                downscale=progress.downscale,
                 cycle=progress.cycle,
                 view=progress.view,
                 view_count=progress.view_count,

@@ -1,0 +1,258 @@
+//! Propagation between views (section 5.6.1 of the paper): consistent solutions are offered to views that have no
+//! validated one there.
+
+use crate::ambc::Candidate;
+use crate::error::{Error, Result};
+use crate::geometry::Camera;
+use crate::geometry::DepthRange;
+use crate::geometry::MIN_FACING;
+use crate::geometry::RelativePose;
+use crate::pipeline::Cancelled;
+use crate::scene::PlaneMap;
+use glam::{DVec2, DVec3, Vec3};
+use rayon::prelude::*;
+
+/// A view that candidates its solutions.
+#[derive(Clone, Copy)]
+pub struct Donor<'a> {
+    /// Its index in the scene: of equal candidates the one of the lowest view is taken.
+    pub view: usize,
+    /// Its camera on this scale.
+    pub camera: &'a Camera,
+    /// Its solutions.
+    pub map: &'a PlaneMap,
+}
+
+/// The candidates to the pixels of a target view that are not validated: for each the one of lowest cost among all
+/// solutions that project there and agree with at least one source view. The order of `donors` does not matter.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub fn candidates(
+    camera: &Camera,
+    map: &PlaneMap,
+    range: DepthRange,
+    donors: &[Donor],
+    cancelled: Cancelled,
+) -> Result<Vec<Candidate>> {
+    let blocks: Vec<(&Donor, usize)> = (donors.iter())
+        .flat_map(|donor| (0..donor.map.solutions.len()).step_by(BLOCK).map(move |first| (donor, first)))
+        .collect();
+    let lists = blocks.into_par_iter().map(|(donor, first)| match cancelled() {
+        true => Err(Error::Cancelled),
+        false => Ok(given(camera, map, range, donor, first)),
+    });
+    let lists: Vec<Vec<(usize, Ranked)>> = lists.collect::<Result<_>>()?;
+    let mut best = vec![Candidate::default(); camera.pixels()];
+    best.par_chunks_mut(BLOCK).enumerate().for_each(|(block, best)| {
+        let first = block * BLOCK;
+        let mut ranked = vec![Ranked::default(); best.len()];
+        for list in &lists {
+            let here = &list[list.partition_point(|(target, _)| *target < first)..];
+            for (target, candidate) in here.iter().take_while(|(target, _)| *target < first + best.len()) {
+                ranked[target - first].keep_better(candidate);
+            }
+        }
+        best.iter_mut().zip(ranked).for_each(|(best, ranked)| *best = ranked.candidate);
+    });
+    Ok(best)
+}
+
+/// An candidate and who makes it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Ranked {
+    candidate: Candidate,
+    view: usize,
+}
+
+impl Ranked {
+    fn keep_better(&mut self, other: &Ranked) {
+        let is_better = match (self.candidate.depth > 0.0, other.candidate.depth > 0.0) {
+            (_, false) => false,
+            (false, true) => true,
+            (true, true) => (other.candidate.cost, other.view) < (self.candidate.cost, self.view),
+        };
+        if is_better {
+            *self = *other;
+        }
+    }
+}
+
+/// Pixels that one thread takes at once, between two looks whether to go on.
+const BLOCK: usize = 1 << 13;
+
+/// The candidates that a view makes from a block of its pixels on, by the pixels they fall on.
+fn given(
+    camera: &Camera,
+    map: &PlaneMap,
+    range: DepthRange,
+    donor: &Donor,
+    first: usize,
+) -> Vec<(usize, Ranked)> {
+    let pose = RelativePose::new(donor.camera, camera);
+    let rotation = camera.rotation * donor.camera.rotation.transpose();
+    let translation = camera.translation - rotation * donor.camera.translation;
+    let width = donor.camera.width as usize;
+    let mut candidates = Vec::new();
+    for (pixel, solution) in donor.map.solutions.iter().enumerate().skip(first).take(BLOCK) {
+        if solution.depth <= 0.0 || solution.consistent == 0 {
+            continue;
+        }
+        let (x, y) = (pixel % width, pixel / width);
+        let place = pose.at_infinity(x as f32, y as f32) + pose.epipole / solution.depth;
+        // Most solutions land where another one is validated: what is exact is worked out for the others only.
+        let Some(target) = nearest_pixel(camera, place).filter(|&target| !map.solutions[target].validated)
+        else {
+            continue;
+        };
+        let ray = donor.camera.ray(DVec2::new(x as f64, y as f64));
+        let point = rotation * (ray * f64::from(solution.depth)) + translation;
+        let normal = rotation * solution.normal.as_dvec3();
+        if let Some(depth) = depth_at(camera, target, point, normal, range) {
+            let candidate = Candidate { depth, normal: normal.as_vec3(), cost: solution.cost.into() };
+            candidates.push((target, Ranked { candidate, view: donor.view }));
+        }
+    }
+    candidates.sort_by_key(|(target, _)| *target);
+    candidates
+}
+
+/// The pixel a homogeneous point falls on, `None` behind the camera or outside its image.
+fn nearest_pixel(camera: &Camera, point: Vec3) -> Option<usize> {
+    let (x, y) = (point.x / point.z + 0.5, point.y / point.z + 0.5);
+    let is_inside =
+        point.z > 0.0 && x >= 0.0 && y >= 0.0 && x < camera.width as f32 && y < camera.height as f32;
+    is_inside.then(|| y as usize * camera.width as usize + x as usize)
+}
+
+/// The depth of a plane, through a point of the target's frame, exactly at a pixel.
+fn depth_at(camera: &Camera, pixel: usize, point: DVec3, normal: DVec3, range: DepthRange) -> Option<f32> {
+    let width = camera.width as usize;
+    let ray = camera.ray(DVec2::new((pixel % width) as f64, (pixel / width) as f64));
+    let facing = normal.dot(ray);
+    let depth = normal.dot(point) / facing;
+    let is_usable = facing < -f64::from(MIN_FACING) && depth >= range.near && depth <= range.far;
+    is_usable.then_some(depth as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::PixelEstimate;
+    use crate::scene::plane_map::ShortCost;
+    use crate::testing::{self, RANGE, World};
+
+    /// A world, its target's map, and the exact maps of the others.
+    fn target_and_givers() -> (World, PlaneMap, Vec<PlaneMap>) {
+        let world = World::five();
+        let mut maps = world.exact();
+        let target = maps.remove(0);
+        (world, target, maps)
+    }
+
+    /// What views of these indices candidate to view 0.
+    fn offered(world: &World, target: &PlaneMap, donors: &[(usize, &PlaneMap)]) -> Vec<Candidate> {
+        let donors: Vec<Donor> =
+            donors.iter().map(|&(view, map)| Donor { view, camera: &world.cameras[view], map }).collect();
+        let candidates = candidates(&world.cameras[0], target, RANGE, &donors, &|| false).unwrap();
+        assert_eq!(candidates.len(), target.solutions.len());
+        candidates
+    }
+
+    fn count(candidates: &[Candidate]) -> usize {
+        candidates.iter().filter(|candidate| candidate.depth > 0.0).count()
+    }
+
+    #[test]
+    fn an_offer_lands_where_its_point_projects_with_its_plane_s_depth_there() {
+        let (world, target, donors) = target_and_givers();
+        let candidates = offered(&world, &target, &[(1, &donors[0])]);
+        let camera = &world.cameras[0];
+        assert!(count(&candidates) > camera.pixels() / 2);
+        for (pixel, candidate) in candidates.iter().enumerate().filter(|(_, candidate)| candidate.depth > 0.0)
+        {
+            // Points land beside the pixel's center, and the wall is slanted: only its plane is exact.
+            assert!((candidate.depth / testing::depth(camera, pixel) - 1.0).abs() < 1e-5);
+            assert!(candidate.normal.distance(testing::normal(camera)) < 1e-5);
+            assert_eq!(candidate.cost, f32::from(ShortCost::from(0.1)));
+        }
+    }
+
+    #[test]
+    fn a_single_solution_lands_at_a_single_pixel() {
+        let (world, target, mut donors) = target_and_givers();
+        let source = 10 * 36 + 20;
+        for (pixel, solution) in donors[0].solutions.iter_mut().enumerate() {
+            solution.consistent = u8::from(pixel == source);
+        }
+        let candidates = offered(&world, &target, &[(1, &donors[0])]);
+        let camera = &world.cameras[1];
+        let depth = f64::from(donors[0].solutions[source].depth);
+        let point = camera.unproject(testing::place(camera, source), depth);
+        let (x, y) = world.cameras[0].nearest_pixel(world.cameras[0].project(point).unwrap().0).unwrap();
+        assert_eq!(count(&candidates), 1);
+        assert!(candidates[(y * 36 + x) as usize].depth > 0.0);
+    }
+
+    #[test]
+    fn validated_pixels_get_no_offer() {
+        let (world, mut target, donors) = target_and_givers();
+        for solution in &mut target.solutions[..500] {
+            solution.validated = true;
+        }
+        let candidates = offered(&world, &target, &[(1, &donors[0]), (2, &donors[1])]);
+        assert_eq!(count(&candidates[..500]), 0);
+        assert!(count(&candidates[500..]) > 250);
+    }
+
+    #[test]
+    fn only_what_a_source_confirmed_is_offered() {
+        let (world, target, mut donors) = target_and_givers();
+        donors[0].solutions.iter_mut().for_each(|solution| solution.consistent = 0);
+        assert_eq!(count(&offered(&world, &target, &[(1, &donors[0])])), 0);
+        donors[0].solutions.iter_mut().for_each(|solution| {
+            *solution = PixelEstimate { consistent: 1, depth: 0.0, ..*solution };
+        });
+        assert_eq!(count(&offered(&world, &target, &[(1, &donors[0])])), 0);
+    }
+
+    #[test]
+    fn the_cheapest_offer_is_taken_and_of_equals_that_of_the_lowest_view_in_any_order() {
+        let (mut world, target, mut donors) = target_and_givers();
+        // Views at the same place candidate the same points: their normals tell who was taken.
+        (world.cameras[2], world.cameras[3]) = (world.cameras[1], world.cameras[1]);
+        let tilt = |map: &PlaneMap, x: f32, cost: f32| {
+            let mut map = map.clone();
+            map.solutions.iter_mut().for_each(|s| {
+                *s = PixelEstimate { normal: (s.normal + x * Vec3::X).normalize(), cost: cost.into(), ..*s };
+            });
+            map
+        };
+        donors[1] = tilt(&donors[0], 0.1, 0.1);
+        donors[2] = tilt(&donors[0], 0.2, 0.05);
+        let (one, two, three) = ((1, &donors[0]), (2, &donors[1]), (3, &donors[2]));
+        let only = |donor| offered(&world, &target, &[donor]);
+        assert_ne!(only(one), only(two));
+        assert_eq!(offered(&world, &target, &[one, two]), only(one));
+        assert_eq!(offered(&world, &target, &[two, one]), only(one));
+        for order in [[one, two, three], [three, one, two], [two, three, one]] {
+            assert_eq!(offered(&world, &target, &order), only(three));
+        }
+    }
+
+    #[test]
+    fn without_givers_nothing_is_offered() {
+        let (world, target, _) = target_and_givers();
+        assert_eq!(offered(&world, &target, &[]), vec![Candidate::default(); target.solutions.len()]);
+    }
+
+    #[test]
+    fn a_plane_beyond_the_target_s_range_or_turned_away_is_not_offered() {
+        let (world, target, mut donors) = target_and_givers();
+        let short = DepthRange { near: 1.0, far: 3.0 };
+        let donor = Donor { view: 1, camera: &world.cameras[1], map: &donors[0] };
+        assert_eq!(count(&candidates(&world.cameras[0], &target, short, &[donor], &|| false).unwrap()), 0);
+        donors[0].solutions.iter_mut().for_each(|solution| solution.normal = -solution.normal);
+        assert_eq!(count(&offered(&world, &target, &[(1, &donors[0])])), 0);
+    }
+}

@@ -1,0 +1,50 @@
+//! Fused points.
+
+/// Fused points.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PointCloud {
+    /// World positions.
+    pub positions: Vec<[f64; 3]>,
+    /// Unit normals in the world frame.
+    pub normals: Vec<[f32; 3]>,
+    /// Red, green, blue.
+    pub colors: Vec<[u8; 3]>,
+    /// The views each point was fused from, as indices into the scene, the first being the one it started in.
+    pub views: PointViews,
+}
+
+/// A list of views for each point, in one allocation.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct PointViews {
+    ends: Vec<usize>,
+    views: Vec<u32>,
+}
+
+impl PointViews {
+    /// Appends the list of one more point.
+    pub fn push(&mut self, views: &[u32]) {
+        self.views.extend_from_slice(views);
+        self.ends.push(self.views.len());
+    }
+
+    /// The list of the point with this index.
+    pub fn get(&self, point: usize) -> &[u32] {
+        let start = if point == 0 { 0 } else { self.ends[point - 1] };
+        &self.views[start..self.ends[point]]
+    }
+
+    /// Lengths of all lists added up.
+    pub fn total(&self) -> usize {
+        self.views.len()
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there is no point.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+}

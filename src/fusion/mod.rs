@@ -1,0 +1,231 @@
+//! Fusion of depth and normal maps into points (section 6 of the paper).
+//!
+//! Every pixel with a depth is a point that the overlapping views vouch for or against. One with enough agreeing
+//! views becomes a point of the cloud, averaged over them, and uses up the pixel it falls on in each: those start no
+//! points of their own. Pixels no point falls on do, so the cloud stays as dense as the view that saw a surface best.
+
+mod average;
+mod cloud;
+mod overlap;
+mod source;
+
+use crate::error::{Error, Result};
+use crate::geometry::Camera;
+use crate::image::Picture;
+use crate::options::FusionOptions;
+use crate::pipeline::{Hook, Phase, Progress};
+use crate::scene::Maps;
+use crate::scene::PixelStatus;
+use average::{Member, average};
+pub use cloud::{PointCloud, PointViews};
+use glam::{DVec2, DVec3};
+pub use overlap::overlaps;
+use rayon::prelude::*;
+use source::{Opinion, Source};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A view with its maps, as fusion needs it.
+#[derive(Debug, Clone, Copy)]
+pub struct FusionView<'a> {
+    /// The camera of the maps.
+    pub camera: &'a Camera,
+    /// Depth and normal, one each a pixel. A depth that is not a finite number above 0 is no estimate.
+    pub maps: &'a Maps,
+    /// What became of each pixel: only validated ones are estimates. Without it all with a depth are.
+    pub status: Option<&'a [PixelStatus]>,
+    /// For the colors; gray (128) without.
+    pub picture: Option<&'a Picture>,
+    /// The views that may see the same surface, as indices into the list of views.
+    pub overlap: &'a [u32],
+}
+
+/// Rows fused at once: the hook is asked before each such band.
+const BAND_ROWS: u32 = 32;
+
+/// Fuses the maps of all views, on the threads of the current rayon pool; the cloud is the same for any number of
+/// them. The hook sees [`Phase::Fusion`] with `done` from 0 to 1 for the fusion alone.
+///
+/// # Errors
+/// Options out of range; a camera that makes no sense; maps or a picture of another size than their camera; an
+/// overlap that names a view there is not, the view itself or a view twice; [`Error::Cancelled`].
+pub fn fuse(views: &[FusionView], options: &FusionOptions, hook: Hook) -> Result<PointCloud> {
+    options.check()?;
+    for index in 0..views.len() {
+        check_view(views, index)?;
+    }
+    let used: Vec<Used> = views.iter().map(|view| Used::none_of(view.camera.pixels())).collect();
+    let total_rows: u64 = views.iter().map(|view| u64::from(view.camera.height)).sum();
+    let mut rows_done = 0;
+    let report = |view: usize, rows_done: u64| {
+        let done = rows_done as f64 / total_rows.max(1) as f64;
+        let progress =
+            Progress { phase: Phase::Fusion, downscale: 1, cycle: 0, view, views: views.len(), done };
+        if hook(&progress).is_break() { Err(Error::Cancelled) } else { Ok(()) }
+    };
+
+    let mut cloud = PointCloud::default();
+    for index in 0..views.len() {
+        let reference = Reference::new(views, index, options, &used);
+        let height = views[index].camera.height;
+        for top in (0..height).step_by(BAND_ROWS as usize) {
+            report(index, rows_done)?;
+            let rows = top..height.min(top + BAND_ROWS);
+            rows_done += rows.len() as u64;
+            let fused: Vec<PointCloud> = rows.into_par_iter().map(|row| reference.fuse_row(row)).collect();
+            fused.iter().for_each(|points| append(&mut cloud, points));
+        }
+    }
+    if let Some(last) = views.len().checked_sub(1) {
+        report(last, rows_done)?;
+    }
+    Ok(cloud)
+}
+
+fn check_view(views: &[FusionView], index: usize) -> Result<()> {
+    let (view, name) = (&views[index], format!("views[{index}]"));
+    view.camera.check(&format!("{name}.camera"))?;
+    let pixels = view.camera.pixels();
+    let lengths = [
+        ("maps.depth", Some(view.maps.depth.len())),
+        ("maps.normal", Some(view.maps.normal.len())),
+        ("status", view.status.map(<[PixelStatus]>::len)),
+    ];
+    for (map, len) in lengths {
+        if let Some(len) = len.filter(|len| *len != pixels) {
+            let expected = format!("one for each of the camera's {pixels} pixels");
+            return Err(Error::argument(format!("{name}.{map}"), format!("{len} values"), expected));
+        }
+    }
+    if let Some(picture) = view.picture
+        && (picture.width(), picture.height()) != (view.camera.width, view.camera.height)
+    {
+        let value = format!("{}x{}", picture.width(), picture.height());
+        let expected = format!("the camera's size, {}x{}", view.camera.width, view.camera.height);
+        return Err(Error::argument(format!("{name}.picture"), value, expected));
+    }
+    for (place, &other) in view.overlap.iter().enumerate() {
+        let known = (other as usize) < views.len() && other as usize != index;
+        if !known || view.overlap[..place].contains(&other) {
+            let expected = format!("other views below {}, each once", views.len());
+            return Err(Error::argument(format!("{name}.overlap[{place}]"), other, expected));
+        }
+    }
+    Ok(())
+}
+
+fn append(cloud: &mut PointCloud, points: &PointCloud) {
+    cloud.positions.extend_from_slice(&points.positions);
+    cloud.normals.extend_from_slice(&points.normals);
+    cloud.colors.extend_from_slice(&points.colors);
+    for point in 0..points.views.len() {
+        cloud.views.push(points.views.get(point));
+    }
+}
+
+/// Depth and unit normal of a pixel, `None` where there is no usable estimate.
+fn estimate(view: &FusionView, pixel: usize) -> Option<(f64, DVec3)> {
+    if view.status.is_some_and(|status| status[pixel] != PixelStatus::Validated) {
+        return None;
+    }
+    let depth = view.maps.depth[pixel];
+    let normal = DVec3::from_array(view.maps.normal[pixel].map(f64::from)).try_normalize()?;
+    (depth > 0.0 && depth.is_finite()).then_some((f64::from(depth), normal))
+}
+
+/// The pixels of a view that are part of a point, a bit each.
+struct Used(Vec<AtomicU64>);
+
+impl Used {
+    fn none_of(pixels: usize) -> Used {
+        Used((0..pixels.div_ceil(64)).map(|_| AtomicU64::new(0)).collect())
+    }
+
+    fn has(&self, pixel: usize) -> bool {
+        self.0[pixel / 64].load(Ordering::Relaxed) >> (pixel % 64) & 1 != 0
+    }
+
+    fn add(&self, pixel: usize) {
+        self.0[pixel / 64].fetch_or(1 << (pixel % 64), Ordering::Relaxed);
+    }
+}
+
+/// The view whose pixels become points. Positions are relative to its center: large world coordinates lose no digits.
+struct Reference<'a> {
+    views: &'a [FusionView<'a>],
+    index: usize,
+    options: &'a FusionOptions,
+    sources: Vec<Source<'a>>,
+    /// By view and pixel, whether the pixel is part of a point. While one view is the reference, its own flags are only
+    /// read and those of the others only set: the order of the threads does not matter.
+    used: &'a [Used],
+}
+
+impl<'a> Reference<'a> {
+    fn new(views: &'a [FusionView<'a>], index: usize, options: &'a FusionOptions, used: &'a [Used]) -> Self {
+        let sources = views[index]
+            .overlap
+            .iter()
+            .map(|&other| Source::new(views[index].camera, other, &views[other as usize], options));
+        Reference { views, index, options, sources: sources.collect(), used }
+    }
+
+    fn fuse_row(&self, row: u32) -> PointCloud {
+        let view = &self.views[self.index];
+        let to_world = view.camera.rotation.transpose();
+        let first = row as usize * view.camera.width as usize;
+        let mut points = PointCloud::default();
+        let (mut members, mut point_views) = (Vec::new(), Vec::new());
+        for column in 0..view.camera.width {
+            let pixel = first + column as usize;
+            if self.used[self.index].has(pixel) {
+                continue;
+            }
+            let Some((depth, normal)) = estimate(view, pixel) else { continue };
+            let position = DVec2::new(f64::from(column), f64::from(row));
+            let start = Member {
+                view: self.index as u32,
+                pixel,
+                position: to_world * (view.camera.ray(position) * depth),
+                normal: to_world * normal,
+                weight: weight(view.camera, depth),
+            };
+            if !self.gather(start, position, depth, &mut members) {
+                continue;
+            }
+            for member in &members[1..] {
+                self.used[member.view as usize].add(member.pixel);
+            }
+            point_views.clear();
+            point_views.extend(members.iter().map(|member| member.view));
+            let (position, normal, color) = average(&members, |member| {
+                self.views[member.view as usize].picture.map(|picture| picture.rgb(member.pixel))
+            });
+            points.positions.push((view.camera.center() + position).to_array());
+            points.normals.push(normal.as_vec3().to_array());
+            points.colors.push(color);
+            points.views.push(&point_views);
+        }
+        points
+    }
+
+    /// Collects the start and the pixels of other views that agree with it; whether that makes a point.
+    fn gather(&self, start: Member, pixel: DVec2, depth: f64, members: &mut Vec<Member>) -> bool {
+        members.clear();
+        members.push(start);
+        let mut conflicts = 0;
+        for source in &self.sources {
+            match source.opinion(pixel, depth, &start) {
+                Opinion::Agrees(member) => members.push(member),
+                Opinion::SeesThrough => conflicts += 1,
+                Opinion::None => {}
+            }
+        }
+        // Edges of thin things are seen past by some views that are half a pixel off; only a majority is believed.
+        members.len() > self.options.min_views as usize && conflicts <= members.len()
+    }
+}
+
+/// Weight in the average: the inverse square of the width of a pixel on the surface.
+fn weight(camera: &Camera, depth: f64) -> f64 {
+    camera.fx * camera.fy / (depth * depth)
+}

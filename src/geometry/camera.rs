@@ -1,0 +1,134 @@
+//! Pinhole cameras in f64.
+//!
+//! Conventions: `x_cam = R * X_world + t` with x right, y down, z forward; pixel centers are integers, the
+//! top-left pixel's center is (0, 0); depth is z in the camera frame.
+
+use crate::error::{Error, Result};
+use glam::{DMat3, DVec2, DVec3};
+
+/// A calibrated pinhole camera without skew or distortion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera {
+    /// Width of its image in pixels.
+    pub width: u32,
+    /// Height of its image in pixels.
+    pub height: u32,
+    /// Focal length in pixels along x.
+    pub fx: f64,
+    /// Focal length in pixels along y.
+    pub fy: f64,
+    /// Principal point, in pixels, where the center of the top-left pixel is 0.
+    pub cx: f64,
+    /// Principal point, in pixels, where the center of the top-left pixel is 0.
+    pub cy: f64,
+    /// World to camera.
+    pub rotation: DMat3,
+    /// World to camera, in world units.
+    pub translation: DVec3,
+}
+
+impl Camera {
+    /// The widest or highest image the crate accepts, in pixels.
+    pub const MAX_SIDE: u32 = 32_768;
+
+    /// Refuses a camera no image can have been taken with; `name` is how the error calls it.
+    pub fn check(&self, name: &str) -> Result<()> {
+        for (field, side) in [("width", self.width), ("height", self.height)] {
+            if side == 0 || side > Self::MAX_SIDE {
+                let expected = format!("1 to {} pixels", Self::MAX_SIDE);
+                return Err(Error::argument(format!("{name}.{field}"), side, expected));
+            }
+        }
+        for (field, focal) in [("fx", self.fx), ("fy", self.fy)] {
+            if !(focal.is_finite() && focal > 0.0) {
+                return Err(Error::argument(
+                    format!("{name}.{field}"),
+                    focal,
+                    "a finite focal length above 0",
+                ));
+            }
+        }
+        for (field, value) in [("cx", self.cx), ("cy", self.cy)] {
+            if !value.is_finite() {
+                return Err(Error::argument(format!("{name}.{field}"), value, "a finite number of pixels"));
+            }
+        }
+        if !self.translation.is_finite() {
+            return Err(Error::argument(format!("{name}.translation"), self.translation, "finite numbers"));
+        }
+        let deviation = self.rotation * self.rotation.transpose() - DMat3::IDENTITY;
+        let is_orthonormal = deviation.to_cols_array().iter().all(|e| e.abs() < 1e-4);
+        if !(is_orthonormal && self.rotation.determinant() > 0.0) {
+            let expected = "a rotation (orthonormal, determinant 1)";
+            return Err(Error::argument(format!("{name}.rotation"), self.rotation, expected));
+        }
+        Ok(())
+    }
+
+    /// Number of pixels of its image.
+    pub fn pixels(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// The calibration matrix K.
+    pub fn calibration(&self) -> DMat3 {
+        DMat3::from_cols(
+            DVec3::new(self.fx, 0.0, 0.0),
+            DVec3::new(0.0, self.fy, 0.0),
+            DVec3::new(self.cx, self.cy, 1.0),
+        )
+    }
+
+    /// The center of projection in the world frame.
+    pub fn center(&self) -> DVec3 {
+        -(self.rotation.transpose() * self.translation)
+    }
+
+    /// `K^-1 [x y 1]`: the direction of a pixel's ray in the camera frame, with z = 1.
+    pub fn ray(&self, pixel: DVec2) -> DVec3 {
+        DVec3::new((pixel.x - self.cx) / self.fx, (pixel.y - self.cy) / self.fy, 1.0)
+    }
+
+    /// A world point in the camera frame.
+    pub fn to_camera(&self, world: DVec3) -> DVec3 {
+        self.rotation * world + self.translation
+    }
+
+    /// The world point at `depth` behind `pixel`.
+    pub fn unproject(&self, pixel: DVec2, depth: f64) -> DVec3 {
+        self.rotation.transpose() * (self.ray(pixel) * depth - self.translation)
+    }
+
+    /// The pixel a point of the camera frame falls on, `None` at or behind the camera.
+    pub fn project_camera(&self, point: DVec3) -> Option<DVec2> {
+        (point.z > 0.0)
+            .then(|| DVec2::new(self.fx * point.x / point.z + self.cx, self.fy * point.y / point.z + self.cy))
+    }
+
+    /// The pixel and depth of a world point, `None` at or behind the camera.
+    pub fn project(&self, world: DVec3) -> Option<(DVec2, f64)> {
+        let point = self.to_camera(world);
+        self.project_camera(point).map(|pixel| (pixel, point.z))
+    }
+
+    /// Column and row of the pixel whose area holds `pixel`, `None` outside the image.
+    pub fn nearest_pixel(&self, pixel: DVec2) -> Option<(u32, u32)> {
+        let (x, y) = ((pixel.x + 0.5).floor(), (pixel.y + 0.5).floor());
+        let inside = x >= 0.0 && y >= 0.0 && x < f64::from(self.width) && y < f64::from(self.height);
+        inside.then_some((x as u32, y as u32))
+    }
+
+    /// The camera of the image reduced to half size, each pixel the mean of 2 x 2 (an odd side is rounded up).
+    pub fn halved(&self) -> Camera {
+        Camera {
+            width: self.width.div_ceil(2),
+            height: self.height.div_ceil(2),
+            fx: self.fx / 2.0,
+            fy: self.fy / 2.0,
+            // The center of coarse pixel X lies at fine coordinate 2 X + 0.5.
+            cx: (self.cx - 0.5) / 2.0,
+            cy: (self.cy - 0.5) / 2.0,
+            ..*self
+        }
+    }
+}

@@ -1,0 +1,16 @@
+//! Geometry of pinhole views: cameras, planes, relative poses, depth ranges, pixel grids and sets of views.
+//!
+//! Conventions: `x_cam = R * X_world + t` with x right, y down, z forward; pixel centers are integers, the top-left
+//! pixel's center is (0, 0); depth is z in the camera frame.
+
+mod camera;
+mod depth_range;
+mod plane;
+mod relative_pose;
+mod view_set;
+
+pub use camera::Camera;
+pub use depth_range::DepthRange;
+pub use plane::{MIN_FACING, Plane, SlantedPlane};
+pub use relative_pose::{RelativePose, plane_homography};
+pub use view_set::ViewSets;

@@ -1,0 +1,281 @@
+//! Every number the method depends on: grouped options, presets, and the table of names, ranges and units.
+//!
+//! Fractions are fractions, angles are degrees. Numbers that are properties of an algorithm and not choices of a user are
+//! named constants at the top of the files that use them.
+
+mod groups;
+mod presets;
+mod schedule;
+mod value;
+
+use crate::error::{Error, Result};
+use crate::simd::SimdLevel;
+use groups::GROUPED;
+pub use groups::{
+    CheckOptions, CostOptions, FusionOptions, RefineOptions, SearchOptions, ViewSelectionOptions,
+    WindowOptions,
+};
+pub use schedule::{Scale, ScheduleOptions};
+use schedule::{scales_from_text, scales_to_text};
+#[cfg(feature = "capi")]
+use std::ffi::CStr;
+use value::Entry;
+pub use value::{Kind, OptionInfo, OptionValue};
+
+/// All options. Start from a preset; every field may be changed.
+///
+/// By name an option is a field with its group, such as `check.depth_tolerance`; where no other group has a field of that
+/// name, the field's name alone does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// Seed of the random generator; the same seed gives the same bits.
+    pub seed: u64,
+    /// Worker threads, 0 to 4096; 0 takes one for each core. The result does not depend on it.
+    pub threads: usize,
+    /// Instruction set of the kernels; `None` takes the best the machine has. The result does not depend on it.
+    pub simd: Option<SimdLevel>,
+    /// The scales and their cycles.
+    pub schedule: ScheduleOptions,
+    /// The patches.
+    pub window: WindowOptions,
+    /// The cost of a plane.
+    pub cost: CostOptions,
+    /// The search of each pixel.
+    pub search: SearchOptions,
+    /// The source views.
+    pub view_selection: ViewSelectionOptions,
+    /// The geometric consistency check.
+    pub check: CheckOptions,
+    /// Filters of the planes.
+    pub refine: RefineOptions,
+    /// Fusion into points.
+    pub fusion: FusionOptions,
+}
+
+/// The word for the best instruction set there is.
+const BEST: &str = "best";
+
+const SEED: OptionInfo = OptionInfo {
+    name: "seed",
+    explanation: "Seed of the random generator; the same seed gives the same bits.",
+    unit: "any",
+    kind: Kind::Count { min: 0, max: u64::MAX },
+};
+
+const SIMD: OptionInfo = OptionInfo {
+    name: "simd",
+    explanation: "Instruction set: scalar, baseline, v3, or best for the best the machine has; the result does not \
+                  depend on it.",
+    unit: "name",
+    kind: Kind::Text,
+};
+
+const SCALES: OptionInfo = OptionInfo {
+    name: "schedule.scales",
+    explanation: "Scales from coarse to fine, each twice as large as the one before, the last at full size: \
+                  `downscale=2 food_sources=3 iterations=5+4x1; downscale=1 food_sources=2 iterations=1+2x1` is half \
+                  size with 3 food sources a pixel, 5 iterations in the first cycle and 4 more cycles of 1, then full \
+                  size.",
+    unit: "text",
+    kind: Kind::Text,
+};
+
+/// The options outside the groups that are numbers.
+const OTHERS: &[Entry] = &[
+    Entry {
+        c_name: c"threads",
+        explanation: "Worker threads; 0 takes one for each core. The result does not depend on it.",
+        unit: "threads",
+        kind: Kind::Count { min: 0, max: 4096 },
+        get: |options| options.threads as f64,
+        set: |options, value| options.threads = value as usize,
+    },
+    Entry {
+        c_name: c"schedule.min_changed_fraction",
+        explanation: "A scale ends early once fewer than this fraction of the pixels changed in a cycle.",
+        unit: "fraction of the pixels",
+        kind: Kind::Number { min: 0.0, max: 1.0 },
+        get: |options| options.schedule.min_changed_fraction,
+        set: |options, value| options.schedule.min_changed_fraction = value,
+    },
+];
+
+fn numbers() -> impl Iterator<Item = &'static Entry> {
+    OTHERS.iter().chain(GROUPED)
+}
+
+impl Options {
+    /// Refuses values no run can be made with, naming the option.
+    ///
+    /// # Errors
+    /// An option out of its range.
+    pub fn check(&self) -> Result<()> {
+        self.check_scales()?;
+        for entry in numbers() {
+            entry.kind.check(entry.name(), (entry.get)(self))?;
+        }
+        let ViewSelectionOptions { min_triangulation_angle: min, max_triangulation_angle: max, .. } =
+            self.view_selection;
+        Kind::Number { min, max: 180.0 }.check("view_selection.max_triangulation_angle", max)?;
+        if self.cost.max_views_per_pixel == 1 {
+            let expected = "0 for all views of the set, or at least 2";
+            return Err(Error::argument("options.cost.max_views_per_pixel", 1, expected));
+        }
+        Ok(())
+    }
+
+    /// Views a hypothesis must be seen in for its cost to mean anything. The sum over all views is infinite for fewer than
+    /// two by itself.
+    pub(crate) fn min_matched_views(&self) -> usize {
+        match self.cost.best_views {
+            0 => 2,
+            _ => self.check.min_consistent_views.min(2) as usize,
+        }
+    }
+
+    /// All options, in the order in which they are listed: name, explanation, unit and values of each.
+    pub fn infos() -> impl Iterator<Item = OptionInfo> {
+        let [threads, min_changed] = [&OTHERS[0], &OTHERS[1]].map(Entry::info);
+        [SEED, threads, SIMD, SCALES, min_changed].into_iter().chain(GROUPED.iter().map(Entry::info))
+    }
+
+    /// The groups with a sentence on each, in the order of the options.
+    pub fn groups() -> impl Iterator<Item = (&'static str, &'static str)> {
+        let schedule = ("schedule", "Schedule: the scales of a run and the cycles on each.");
+        let trimmed = |&(name, text): &(&'static str, &'static str)| (name, text.trim_start());
+        std::iter::once(schedule).chain(groups::GROUPS.iter().map(trimmed))
+    }
+
+    /// What the option of this name is.
+    ///
+    /// # Errors
+    /// No option of this name, or several.
+    pub fn info(name: &str) -> Result<OptionInfo> {
+        let in_full = |info: &OptionInfo| info.name == name;
+        let alone = |info: &OptionInfo| info.name.split_once('.').is_some_and(|(_, field)| field == name);
+        if let Some(found) = Options::infos().find(in_full) {
+            return Ok(found);
+        }
+        let found: Vec<OptionInfo> = Options::infos().filter(alone).collect();
+        match found[..] {
+            [only] => Ok(only),
+            [] => Err(Error::argument("option", name, format!("one of {}", names(Options::infos())))),
+            _ => Err(Error::argument("option", name, format!("one of {}", names(found.into_iter())))),
+        }
+    }
+
+    /// The value of the option of this name.
+    ///
+    /// # Errors
+    /// No option of this name, or several.
+    pub fn get(&self, name: &str) -> Result<OptionValue> {
+        let info = Options::info(name)?;
+        Ok(match numbers().find(|entry| entry.name() == info.name) {
+            Some(entry) => entry.value(self),
+            None if info == SEED => OptionValue::Count(self.seed),
+            None if info == SIMD => OptionValue::Text(self.simd.map_or(BEST, SimdLevel::name).to_owned()),
+            None => OptionValue::Text(scales_to_text(&self.schedule.scales)),
+        })
+    }
+
+    /// Sets the option of this name that is a number; a switch is 1 or 0.
+    ///
+    /// # Errors
+    /// No option of this name, or several; an option that is no number; a value out of its range. Nothing is changed
+    /// then.
+    pub fn set_number(&mut self, name: &str, value: f64) -> Result<()> {
+        let info = Options::info(name)?;
+        match numbers().find(|entry| entry.name() == info.name) {
+            Some(entry) => {
+                info.kind.check(info.name, value)?;
+                (entry.set)(self, value);
+            }
+            None if info == SEED => {
+                // Beyond these an f64 does not hold every whole number.
+                info_range(MAX_EXACT).check(info.name, value)?;
+                self.seed = value as u64;
+            }
+            None => return Err(Error::argument(format!("options.{}", info.name), value, "a text")),
+        }
+        Ok(())
+    }
+
+    /// Sets the option of this name from its text, as [`OptionValue`] displays it.
+    ///
+    /// # Errors
+    /// No option of this name, or several; a text that is not of its kind; a value out of its range. Nothing is changed
+    /// then.
+    pub fn set(&mut self, name: &str, text: &str) -> Result<()> {
+        let info = Options::info(name)?;
+        let text = text.trim();
+        let error = |expected: String| {
+            Error::argument(format!("options.{}", info.name), format!("`{text}`"), expected)
+        };
+        if info == SEED {
+            self.seed = text.parse().map_err(|_| error(info.kind.to_string()))?;
+        } else if info == SIMD {
+            let level = SimdLevel::ALL.into_iter().find(|level| level.name() == text);
+            if level.is_none() && text != BEST {
+                return Err(error(format!(
+                    "one of {}, {BEST}",
+                    SimdLevel::ALL.map(SimdLevel::name).join(", ")
+                )));
+            }
+            self.simd = level;
+        } else if info == SCALES {
+            let before = std::mem::replace(&mut self.schedule.scales, scales_from_text(text)?);
+            if let Err(error) = self.check_scales() {
+                self.schedule.scales = before;
+                return Err(error);
+            }
+        } else {
+            let value = match (info.kind, text) {
+                (Kind::Switch, "true") => 1.0,
+                (Kind::Switch, "false") => 0.0,
+                _ => text.parse().map_err(|_| error(info.kind.to_string()))?,
+            };
+            self.set_number(info.name, value)?;
+        }
+        Ok(())
+    }
+
+    /// Every option by name with its value.
+    pub fn values(&self) -> impl Iterator<Item = (&'static str, OptionValue)> + '_ {
+        Options::infos().map(|info| (info.name, self.get(info.name).expect("it is listed")))
+    }
+
+    /// The name with this index in [`Options::infos`], as C has it.
+    #[cfg(feature = "capi")]
+    pub(crate) fn c_name(index: usize) -> Option<&'static CStr> {
+        let name = Options::infos().nth(index)?.name;
+        let others = [(SEED, c"seed"), (SIMD, c"simd"), (SCALES, c"schedule.scales")];
+        let other = others.into_iter().find(|(info, _)| info.name == name).map(|(_, c_name)| c_name);
+        other.or_else(|| numbers().find(|entry| entry.name() == name).map(|entry| entry.c_name))
+    }
+}
+
+impl FusionOptions {
+    /// Refuses values no fusion can be made with, naming the option.
+    ///
+    /// # Errors
+    /// An option out of its range.
+    pub fn check(&self) -> Result<()> {
+        let options = Options { fusion: *self, ..Options::default() };
+        let own = numbers().filter(|entry| entry.name().starts_with("fusion."));
+        own.map(|entry| entry.kind.check(entry.name(), (entry.get)(&options))).collect()
+    }
+}
+
+/// The largest whole number up to which an f64 holds all.
+const MAX_EXACT: u64 = 1 << 53;
+
+fn info_range(max: u64) -> Kind {
+    Kind::Count { min: 0, max }
+}
+
+fn names(infos: impl Iterator<Item = OptionInfo>) -> String {
+    infos.map(|info| info.name).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,5 @@
+//! Threads.
+
+mod pool;
+
+pub use pool::JoinedPool;

@@ -1,0 +1,81 @@
+//! The result of a run.
+
+use crate::ambc::Counts;
+use crate::fusion::PointCloud;
+use crate::geometry::ViewSets;
+use crate::scene::{Maps, PixelStatus};
+
+/// One cycle's search of one view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CycleRecord {
+    /// Size of the images: 1 is full, 2 half, 4 a quarter.
+    pub downscale: u32,
+    /// The cycle on that scale, counted from 0.
+    pub cycle: u32,
+    /// Pixels searched.
+    pub pixels: u64,
+    /// Pixels whose solution changed.
+    pub changed: u64,
+    /// Pixels validated by the check after it.
+    pub validated: u64,
+}
+
+/// The result of one view.
+#[derive(Debug, Clone)]
+pub struct ViewResult {
+    /// Width of all maps in pixels.
+    pub width: u32,
+    /// The raw estimate of every pixel that is not masked.
+    pub estimate: Maps,
+    /// Mean `1 - NCC` of the estimate over the pixel's view set, 0 to 2; lower is surer.
+    pub cost: Vec<f32>,
+    /// What became of each pixel; `Validated` ones make the filtered maps.
+    pub status: Vec<PixelStatus>,
+    /// The view's source views, as indices into the scene; `view_sets` counts along this list.
+    pub sources: Vec<u32>,
+    /// The source views each pixel was matched with.
+    pub view_sets: ViewSets,
+    /// Work done.
+    pub counts: Counts,
+    /// The cycles in order.
+    pub cycles: Vec<CycleRecord>,
+}
+
+impl ViewResult {
+    /// Width and height of all maps.
+    pub fn size(&self) -> (u32, u32) {
+        (self.width, (self.status.len() / (self.width as usize).max(1)) as u32)
+    }
+
+    /// The maps with only what was validated left in them.
+    pub fn filtered(&self) -> Maps {
+        let mut maps = self.estimate.clone();
+        for (pixel, status) in self.status.iter().enumerate() {
+            if *status != PixelStatus::Validated {
+                maps.depth[pixel] = 0.0;
+                maps.normal[pixel] = [0.0; 3];
+            }
+        }
+        maps
+    }
+
+    /// Number of pixels of each status, in the order of [`PixelStatus::ALL`].
+    pub fn status_counts(&self) -> [u64; PixelStatus::ALL.len()] {
+        let mut counts = [0; PixelStatus::ALL.len()];
+        for &status in &self.status {
+            counts[status as usize] += 1;
+        }
+        counts
+    }
+}
+
+/// What a whole run hands out.
+#[derive(Debug, Clone)]
+pub struct Reconstruction {
+    /// One result for each view of the scene.
+    pub views: Vec<ViewResult>,
+    /// The fused cloud.
+    pub points: PointCloud,
+    /// What the host's user should know, in sentences.
+    pub warnings: Vec<String>,
+}

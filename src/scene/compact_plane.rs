@@ -1,0 +1,55 @@
+//! What a view shows of its validated solutions to the other views.
+
+use crate::geometry::SlantedPlane;
+
+/// A validated solution as other views look it up, wherever their hypotheses fall: a [`SlantedPlane`] in eight bytes, so
+/// that more of them stay in cache. Slopes have the upper half of an f32's bits, a relative error of 2^-9 at most: at
+/// half a pixel's distance that is less than a millionth of most depths.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct CompactPlane {
+    /// 0 where nothing is shown.
+    inverse_depth: f32,
+    /// Along x in the upper half, along y in the lower one.
+    slopes: u32,
+}
+
+impl CompactPlane {
+    /// Inverse depth at the pixel; 0 where nothing is shown.
+    #[inline(always)]
+    pub fn inverse_depth(&self) -> f32 {
+        self.inverse_depth
+    }
+
+    /// Its change per pixel along x and y.
+    #[inline(always)]
+    pub fn slopes(&self) -> (f32, f32) {
+        (f32::from_bits(self.slopes & 0xffff_0000), f32::from_bits(self.slopes << 16))
+    }
+}
+
+impl From<SlantedPlane> for CompactPlane {
+    fn from(plane: SlantedPlane) -> CompactPlane {
+        // To the nearest; the slopes of planes that face the camera are far from the largest f32.
+        let upper_half = |slope: f32| slope.to_bits().saturating_add(0x8000) >> 16;
+        let slopes = upper_half(plane.slope_x) << 16 | upper_half(plane.slope_y);
+        CompactPlane { inverse_depth: plane.inverse_depth, slopes }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slopes_are_kept_to_a_half_thousandth_and_inverse_depths_exactly() {
+        for slope in [0.0, 1e-3, -1e-3, 0.123_456, -7.0, 3.3e-9] {
+            let plane = SlantedPlane { inverse_depth: 0.7, slope_x: slope, slope_y: -0.5 * slope };
+            let shown = CompactPlane::from(plane);
+            assert_eq!(shown.inverse_depth(), 0.7);
+            let (x, y) = shown.slopes();
+            assert!((x - slope).abs() <= slope.abs() / 512.0, "{x} for {slope}");
+            assert!((y + 0.5 * slope).abs() <= slope.abs() / 1024.0, "{y} for {}", -0.5 * slope);
+        }
+        assert_eq!(CompactPlane::default().slopes(), (0.0, 0.0));
+    }
+}

@@ -1,0 +1,182 @@
+//! What is handed in: views with image, camera, mask and depth range, and sparse points.
+
+mod compact_plane;
+mod maps;
+pub(crate) mod plane_map;
+mod scaled_view;
+
+use crate::error::{Error, Result};
+use crate::geometry::{Camera, DepthRange};
+use crate::image::Picture;
+pub use compact_plane::CompactPlane;
+use glam::DVec3;
+pub use maps::{Maps, PixelStatus};
+pub use plane_map::{PixelEstimate, PlaneMap, surface};
+pub use scaled_view::ScaledView;
+
+/// One calibrated photograph.
+#[derive(Debug, Clone)]
+pub struct View {
+    /// A name for messages and files.
+    pub name: String,
+    /// The photograph, of the camera's size.
+    pub picture: Picture,
+    /// Where it was taken from.
+    pub camera: Camera,
+    /// `true` where a depth is wanted, row by row, one a pixel; `None` wants all. A masked pixel still serves as
+    /// source for other views.
+    pub mask: Option<Vec<bool>>,
+    /// Where to look for surfaces; `None` takes it from the sparse points.
+    pub depth_range: Option<DepthRange>,
+    /// The views to match it with, as indices into the scene's views, those that matter most first; `None` chooses them
+    /// by their triangulation angle.
+    pub sources: Option<Vec<u32>>,
+}
+
+/// A point triangulated by structure from motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SparsePoint {
+    /// World position.
+    pub position: DVec3,
+    /// Indices into the scene's views that saw it.
+    pub views: Vec<u32>,
+}
+
+/// Calibrated photographs, checked.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    views: Vec<View>,
+    points: Vec<SparsePoint>,
+    depth_ranges: Vec<DepthRange>,
+}
+
+impl Scene {
+    /// Checks every view and point and settles each view's depth range: its own, else the 1st to 99th percentile of
+    /// the depths of the sparse points it saw, from three quarters of the one to twice the other.
+    ///
+    /// # Errors
+    /// Fewer than two views; a name that occurs twice; a picture or mask of another size than its camera; a camera,
+    /// range or point that is not finite or makes no sense; a point or source list that names a view there is not, or a
+    /// source list that names the view itself or a view twice; a view with neither range nor sparse points.
+    pub fn new(views: Vec<View>, points: Vec<SparsePoint>) -> Result<Scene> {
+        if views.len() < 2 {
+            return Err(Error::argument("views", views.len(), "at least 2 views: depth needs another view"));
+        }
+        check_names(&views)?;
+        for (index, view) in views.iter().enumerate() {
+            let name = format!("views[{index}] ({})", view.name);
+            check_view(view, &name)?;
+            check_sources(&name, index, view.sources.as_deref().unwrap_or_default(), views.len())?;
+        }
+        for (index, point) in points.iter().enumerate() {
+            if !point.position.is_finite() {
+                return Err(Error::argument(
+                    format!("points[{index}]"),
+                    point.position,
+                    "finite coordinates",
+                ));
+            }
+            if let Some(view) = point.views.iter().find(|&&view| view as usize >= views.len()) {
+                let expected = format!("an index below the number of views, {}", views.len());
+                return Err(Error::argument(format!("points[{index}].views"), view, expected));
+            }
+        }
+        let depth_ranges = (0..views.len())
+            .map(|view| match views[view].depth_range {
+                Some(range) => Ok(range),
+                None => range_of_points(&views, view, &points),
+            })
+            .collect::<Result<_>>()?;
+        Ok(Scene { views, points, depth_ranges })
+    }
+
+    /// The views and points again, to change them.
+    pub fn into_parts(self) -> (Vec<View>, Vec<SparsePoint>) {
+        (self.views, self.points)
+    }
+
+    /// The views in the order they were handed in.
+    pub fn views(&self) -> &[View] {
+        &self.views
+    }
+
+    /// The sparse points.
+    pub fn points(&self) -> &[SparsePoint] {
+        &self.points
+    }
+
+    /// The depth range of one view.
+    pub fn depth_range(&self, view: usize) -> DepthRange {
+        self.depth_ranges[view]
+    }
+}
+
+fn check_names(views: &[View]) -> Result<()> {
+    let mut seen = std::collections::HashSet::new();
+    match views.iter().find(|view| !seen.insert(view.name.as_str())) {
+        Some(view) => {
+            Err(Error::argument("views", format!("{} twice", view.name), "a different name for each view"))
+        }
+        None => Ok(()),
+    }
+}
+
+fn check_view(view: &View, name: &str) -> Result<()> {
+    view.camera.check(&format!("{name}.camera"))?;
+    let (width, height) = (view.picture.width(), view.picture.height());
+    if (width, height) != (view.camera.width, view.camera.height) {
+        let expected = format!("the camera's size, {}x{}", view.camera.width, view.camera.height);
+        return Err(Error::argument(format!("{name}.picture"), format!("{width}x{height}"), expected));
+    }
+    if let Some(mask) = &view.mask
+        && mask.len() != view.camera.pixels()
+    {
+        let expected = format!("one for each of the {} pixels", view.camera.pixels());
+        return Err(Error::argument(format!("{name}.mask"), format!("{} values", mask.len()), expected));
+    }
+    match view.depth_range {
+        Some(range) => range.check(&format!("{name}.depth_range")),
+        None => Ok(()),
+    }
+}
+
+fn check_sources(name: &str, view: usize, sources: &[u32], views: usize) -> Result<()> {
+    for (place, &source) in sources.iter().enumerate() {
+        let known = (source as usize) < views && source as usize != view;
+        if !known || sources[..place].contains(&source) {
+            let expected = format!("other views below {views}, each once");
+            return Err(Error::argument(format!("{name}.sources[{place}]"), source, expected));
+        }
+    }
+    Ok(())
+}
+
+/// Percentiles of the depths of sparse points that bound a view's range: outliers of the triangulation lie beyond.
+const RANGE_PERCENTILES: (f64, f64) = (0.01, 0.99);
+/// Surfaces without features may lie before and behind all points. The search is uniform in inverse depth, where twice
+/// the largest depth is not far.
+const RANGE_WIDENING: (f64, f64) = (0.75, 2.0);
+
+fn range_of_points(views: &[View], view: usize, points: &[SparsePoint]) -> Result<DepthRange> {
+    let depth = |point: &SparsePoint| views[view].camera.to_camera(point.position).z;
+    let mut depths: Vec<f64> = points
+        .iter()
+        .filter(|point| point.views.contains(&(view as u32)))
+        .map(depth)
+        .filter(|&depth| depth > 0.0)
+        .collect();
+    if depths.is_empty() {
+        return Err(Error::argument(
+            format!("depth range of {}", views[view].name),
+            "unknown",
+            "sparse points that this view saw, or a depth range given by hand (--depth-range MIN MAX)",
+        ));
+    }
+    depths.sort_by(f64::total_cmp);
+    let percentile = |share: f64| depths[((depths.len() - 1) as f64 * share).round() as usize];
+    let range = DepthRange {
+        near: percentile(RANGE_PERCENTILES.0) * RANGE_WIDENING.0,
+        far: percentile(RANGE_PERCENTILES.1) * RANGE_WIDENING.1,
+    };
+    range.check(&format!("depth range of {} from its sparse points", views[view].name)).map(|()| range)
+}

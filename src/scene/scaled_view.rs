@@ -1,0 +1,98 @@
+//! The views of a scene on one scale of the pyramid.
+
+use crate::geometry::Camera;
+use crate::geometry::DepthRange;
+use crate::image::{PackedImage, Picture, halve_mask};
+use crate::scene::{Scene, View};
+
+/// A view reduced to one scale.
+#[derive(Debug, Clone)]
+pub struct ScaledView {
+    /// Its camera on this scale.
+    pub camera: Camera,
+    /// Its gray image in the layout the kernels sample.
+    pub image: PackedImage,
+    /// Where a depth is wanted: where any pixel of full size wants one.
+    pub mask: Option<Vec<bool>>,
+    /// Where surfaces are looked for.
+    pub range: DepthRange,
+}
+
+impl ScaledView {
+    /// The view of a scene with this index, its image smaller by this power of two.
+    pub fn of(scene: &Scene, index: usize, downscale: u32) -> ScaledView {
+        ScaledView::new(&scene.views()[index], scene.depth_range(index), downscale)
+    }
+
+    fn new(view: &View, range: DepthRange, downscale: u32) -> ScaledView {
+        let mut camera = view.camera;
+        let mut halved: Option<Picture> = None;
+        let mut mask = view.mask.clone();
+        for _ in 0..downscale.trailing_zeros() {
+            halved = Some(halved.as_ref().unwrap_or(&view.picture).halved());
+            mask = mask.map(|mask| halve_mask(&mask, &camera));
+            camera = camera.halved();
+        }
+        ScaledView { camera, image: PackedImage::new(halved.as_ref().unwrap_or(&view.picture)), mask, range }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DMat3, DVec3};
+
+    /// Two views of 5 x 3 pixels of which only one pixel is wanted.
+    fn scene(wanted: usize) -> Scene {
+        let camera = Camera {
+            width: 5,
+            height: 3,
+            fx: 8.0,
+            fy: 8.0,
+            cx: 2.0,
+            cy: 1.0,
+            rotation: DMat3::IDENTITY,
+            translation: DVec3::ZERO,
+        };
+        let view = |name: &str| View {
+            name: name.to_owned(),
+            picture: Picture::from_gray(5, 3, (0..15).map(|pixel| pixel * 10).collect()).unwrap(),
+            camera,
+            mask: Some((0..15).map(|pixel| pixel == wanted).collect()),
+            depth_range: Some(DepthRange { near: 1.0, far: 2.0 }),
+            sources: None,
+        };
+        Scene::new(vec![view("a"), view("b")], Vec::new()).unwrap()
+    }
+
+    #[test]
+    fn a_coarse_pixel_is_wanted_where_any_of_its_fine_ones_is() {
+        for wanted in 0..15 {
+            let (x, y) = (wanted % 5, wanted / 5);
+            for halvings in 0..4usize {
+                let view = ScaledView::of(&scene(wanted), 0, 1 << halvings);
+                let width = view.camera.width as usize;
+                let mask = view.mask.as_ref().unwrap();
+                assert_eq!(mask.len(), view.camera.pixels());
+                let expected = (y >> halvings) * width + (x >> halvings);
+                assert!((0..mask.len()).all(|pixel| mask[pixel] == (pixel == expected)));
+            }
+        }
+    }
+
+    #[test]
+    fn image_camera_and_mask_are_halved_together() {
+        let scene = scene(0);
+        for (downscale, size) in [(1, (5, 3)), (2, (3, 2)), (4, (2, 1)), (8, (1, 1)), (16, (1, 1))] {
+            let views = [0, 1].map(|view| ScaledView::of(&scene, view, downscale));
+            for view in views {
+                assert_eq!((view.camera.width, view.camera.height), size);
+                assert_eq!((view.image.width as u32, view.image.height as u32), size);
+                assert_eq!(view.range, DepthRange { near: 1.0, far: 2.0 });
+            }
+        }
+        let halved = ScaledView::of(&scene, 1, 2).image;
+        assert_eq!(halved.gray(0, 0), 30, "the mean of 0, 10, 50 and 60");
+        assert_eq!(halved.gray(2, 1), 140, "the last pixel alone");
+    }
+}
