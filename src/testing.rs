@@ -16,7 +16,7 @@ use glam::{DMat3, DVec2, DVec3, Vec3};
 /// The wall's depths lie well inside.
 pub const RANGE: DepthRange = DepthRange { near: 2.0, far: 12.0 };
 
-/// The first view is the reference, the others are its sources.
+/// The first view is the problem, the others are its sources.
 pub struct World {
     pub cameras: Vec<Camera>,
     pub images: Vec<PackedImage>,
@@ -111,13 +111,13 @@ impl World {
     }
 
     /// The first view with all others as sources.
-    pub fn reference(&self) -> Problem<'_> {
-        let mut reference = Problem::new(&self.cameras[0], &self.images[0], RANGE);
+    pub fn problem(&self) -> Problem<'_> {
+        let mut problem = Problem::new(&self.cameras[0], &self.images[0], RANGE);
         for view in 1..self.cameras.len() {
             let (image, surface) = (&self.images[view], &self.surfaces[view]);
-            reference.sources.push(Source::new(&self.cameras[0], &self.cameras[view], image, surface));
+            problem.sources.push(Source::new(&self.cameras[0], &self.cameras[view], image, surface));
         }
-        reference
+        problem
     }
 
     /// The exact maps of all views; the reference's pixels have all sources in their sets.

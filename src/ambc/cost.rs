@@ -88,7 +88,7 @@ impl CostRules {
 /// Evaluates hypotheses of one pixel after the other.
 pub struct Evaluator<'a, S: Simd> {
     simd: S,
-    reference: &'a Problem<'a>,
+    problem: &'a Problem<'a>,
     window: &'a Window,
     rules: CostRules,
     patch: ReferencePatch,
@@ -106,15 +106,10 @@ pub struct Evaluator<'a, S: Simd> {
 
 impl<'a, S: Simd> Evaluator<'a, S> {
     /// An evaluator that stands at no pixel yet.
-    pub fn new(
-        simd: S,
-        reference: &'a Problem<'a>,
-        window: &'a Window,
-        rules: CostRules,
-    ) -> Evaluator<'a, S> {
+    pub fn new(simd: S, problem: &'a Problem<'a>, window: &'a Window, rules: CostRules) -> Evaluator<'a, S> {
         Evaluator {
             simd,
-            reference,
+            problem,
             window,
             rules,
             patch: ReferencePatch::new(window),
@@ -122,8 +117,8 @@ impl<'a, S: Simd> Evaluator<'a, S> {
             is_weak: false,
             ray: Vec3::Z,
             gray: 0,
-            projector: SourceProjector::new(simd, reference),
-            views: Vec::with_capacity(reference.sources.len().div_ceil(LANES)),
+            projector: SourceProjector::new(simd, problem),
+            views: Vec::with_capacity(problem.sources.len().div_ceil(LANES)),
             surroundings: Surroundings::new(rules.smoothness),
             counts: Counts::default(),
         }
@@ -131,8 +126,8 @@ impl<'a, S: Simd> Evaluator<'a, S> {
 
     /// The reference view.
     #[inline(always)]
-    pub fn reference(&self) -> &'a Problem<'a> {
-        self.reference
+    pub fn problem(&self) -> &'a Problem<'a> {
+        self.problem
     }
 
     /// The ray of the pixel.
@@ -144,26 +139,26 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     /// Goes to a pixel and takes the source views of `set` for it.
     #[inline(always)]
     pub fn go_to(&mut self, x: usize, y: usize, set: &[u32]) {
-        self.patch.sample(self.simd, self.window, self.reference.image, x, y);
+        self.patch.sample(self.simd, self.window, self.problem.image, x, y);
         self.has_texture = self.patch.has_texture(self.window);
-        self.gray = self.reference.image.gray(x, y);
-        let noise = self.reference.image.noise.variance(self.gray);
+        self.gray = self.problem.image.gray(x, y);
+        let noise = self.problem.image.noise.variance(self.gray);
         self.is_weak = self.patch.variance() < self.rules.noise_ratio * noise;
         let (x, y) = (x as f32, y as f32);
-        self.ray = self.reference.ray(x, y);
+        self.ray = self.problem.ray(x, y);
         self.projector.set_pixel_and_views(x, y, set);
     }
 
     /// Lets the planes of the pixel's neighbors have a say.
     #[inline(always)]
     pub fn look_around(&mut self, neighbors: &Colonies, (x, y): (usize, usize)) {
-        self.surroundings.look(self.reference, self.window, neighbors, (x, y));
+        self.surroundings.look(self.problem, self.window, neighbors, (x, y));
     }
 
     /// How alike the pixel and another one look, from 0 to 1: the bilateral weight of their gray values.
     #[inline(always)]
     pub fn likeness(&self, x: usize, y: usize) -> f32 {
-        self.window.likeness(self.gray, self.reference.image.gray(x, y))
+        self.window.likeness(self.gray, self.problem.image.gray(x, y))
     }
 
     /// Whether the pixel's patch can be matched.
@@ -227,7 +222,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     #[inline(always)]
     pub fn mean_photometric_cost(&mut self, food: &FoodSource) -> f32 {
         self.place(food);
-        let plane = food.plane(self.reference, self.ray);
+        let plane = food.plane(self.problem, self.ray);
         let (mut sum, mut count) = (0.0, 0);
         for group in 0..self.views.len() {
             self.views[group].least = [0.0; LANES];
@@ -258,7 +253,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         let all = seen(&self.views);
         let is_matched = all > count && agreeing < count;
         if is_matched {
-            let plane = food.plane(self.reference, self.ray);
+            let plane = food.plane(self.problem, self.ray);
             for group in 0..self.views.len() {
                 self.add_photometric_costs(&plane, group);
             }
@@ -313,7 +308,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         self.simd.vectorize(
             #[inline(always)]
             || {
-                let Evaluator { simd, window, patch, reference, projector, views, .. } = self;
+                let Evaluator { simd, window, patch, problem, projector, views, .. } = self;
                 let (group, InViews { projections, least }) = (&projector.groups()[group], &mut views[group]);
                 let slopes = group.slopes(*simd, plane);
                 let costs = patch_costs(
@@ -322,10 +317,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
                     patch,
                     #[inline(always)]
                     |lane| {
-                        (
-                            reference.sources[group.sources()[lane]].image,
-                            projections.homography(&slopes, lane),
-                        )
+                        (problem.sources[group.sources()[lane]].image, projections.homography(&slopes, lane))
                     },
                     projections.inside,
                 );
@@ -344,7 +336,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         if count <= 1 {
             return f32::INFINITY;
         }
-        let plane = food.plane(self.reference, self.ray);
+        let plane = food.plane(self.problem, self.ray);
         let divisor = (count - 1) as f32;
         for group in 0..self.views.len() {
             if sum(self.simd, &self.views) >= bound * divisor {
@@ -363,7 +355,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         if count < self.rules.min_views {
             return f32::INFINITY;
         }
-        let plane = food.plane(self.reference, self.ray);
+        let plane = food.plane(self.problem, self.ray);
         let best = best.min(count);
         let limit = bound * best as f32;
         let (mut unmatched, is_guided) = (count, self.rules.geometric.weight > 0.0);

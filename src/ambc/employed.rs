@@ -41,8 +41,8 @@ fn perturb<S: Simd>(
     let in_depth = random.below(2) == 0;
     let amount = random.signed();
     if in_depth {
-        let reference = evaluator.reference();
-        let depth = (food.depth + amount * (other.depth - food.depth)).clamp(reference.near, reference.far);
+        let problem = evaluator.problem();
+        let depth = problem.range.clamp(food.depth + amount * (other.depth - food.depth));
         (depth != food.depth).then(|| FoodSource::new(depth, food.normal))
     } else {
         let normal = (food.normal + amount * (other.normal - food.normal)).normalize_or_zero();

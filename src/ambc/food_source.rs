@@ -1,8 +1,7 @@
 //! Food sources: the hypotheses of a colony.
 
 use super::random::Random;
-use crate::geometry::MIN_FACING;
-use crate::geometry::SlantedPlane;
+use crate::geometry::{MIN_FACING, PlaneHypothesis, SlantedPlane};
 use crate::matching::Problem;
 use glam::Vec3;
 
@@ -32,11 +31,11 @@ impl FoodSource {
     /// A random plane: uniform in inverse depth within the given part (0 to 1) of the range, and over the visible
     /// hemisphere (section 5.1).
     #[inline(always)]
-    pub fn random(reference: &Problem, ray: Vec3, random: &mut Random, part: (f32, f32)) -> FoodSource {
+    pub fn random(problem: &Problem, ray: Vec3, random: &mut Random, part: (f32, f32)) -> FoodSource {
         let share = part.0 + (part.1 - part.0) * random.unit();
-        let (nearest, farthest) = (1.0 / reference.near, 1.0 / reference.far);
+        let (nearest, farthest) = (1.0 / problem.range.near, 1.0 / problem.range.far);
         let inverse_depth = farthest + (nearest - farthest) * share;
-        let depth = (1.0 / inverse_depth).clamp(reference.near, reference.far);
+        let depth = problem.range.clamp(1.0 / inverse_depth);
         FoodSource::new(depth, random.facing_normal(ray))
     }
 
@@ -44,13 +43,13 @@ impl FoodSource {
     #[inline(always)]
     pub fn nearby(
         &self,
-        reference: &Problem,
+        problem: &Problem,
         ray: Vec3,
         random: &mut Random,
         spread: f32,
         tilt: f32,
     ) -> FoodSource {
-        let depth = (self.depth / (1.0 + spread * random.signed())).clamp(reference.near, reference.far);
+        let depth = problem.range.clamp(self.depth / (1.0 + spread * random.signed()));
         let tilted = self.normal + tilt * Vec3::new(random.signed(), random.signed(), random.signed());
         let normal = tilted.normalize_or_zero();
         let facing = normal.dot(ray) < -MIN_FACING;
@@ -60,16 +59,16 @@ impl FoodSource {
     /// The food source of a plane about the pixel with this ray, not evaluated yet; `None` where it leaves the depth range
     /// or turns away from the camera.
     #[inline(always)]
-    pub fn of_plane(reference: &Problem, ray: Vec3, plane: &SlantedPlane) -> Option<FoodSource> {
-        let (depth, normal) = plane.depth_and_normal(ray, reference.inverse_focal);
-        let is_usable = depth >= reference.near && depth <= reference.far && normal.dot(ray) < -MIN_FACING;
+    pub fn of_plane(problem: &Problem, ray: Vec3, plane: &SlantedPlane) -> Option<FoodSource> {
+        let (depth, normal) = plane.depth_and_normal(ray, problem.inverse_focal);
+        let is_usable = PlaneHypothesis { depth, normal }.is_usable(ray, &problem.range);
         is_usable.then(|| FoodSource::new(depth, normal))
     }
 
     /// Its plane written as inverse depth about its pixel.
     #[inline(always)]
-    pub fn plane(&self, reference: &Problem, ray: Vec3) -> SlantedPlane {
-        SlantedPlane::new(self.depth, self.normal, ray, reference.inverse_focal)
+    pub fn plane(&self, problem: &Problem, ray: Vec3) -> SlantedPlane {
+        SlantedPlane::new(self.depth, self.normal, ray, problem.inverse_focal)
     }
 
     /// The same plane at the pixel with ray `to`, `offset` pixels away; `None` where it leaves the depth range or turns
@@ -77,15 +76,15 @@ impl FoodSource {
     #[inline(always)]
     pub fn transferred(
         &self,
-        reference: &Problem,
+        problem: &Problem,
         from: Vec3,
         to: Vec3,
         offset: (f32, f32),
     ) -> Option<FoodSource> {
-        let inverse_depth = self.plane(reference, from).inverse_depth_at(offset.0, offset.1);
+        let inverse_depth = self.plane(problem, from).inverse_depth_at(offset.0, offset.1);
         let depth = 1.0 / inverse_depth;
-        let valid = depth >= reference.near && depth <= reference.far && self.normal.dot(to) < -MIN_FACING;
-        valid.then(|| FoodSource::new(depth, self.normal))
+        let is_usable = PlaneHypothesis { depth, normal: self.normal }.is_usable(to, &problem.range);
+        is_usable.then(|| FoodSource::new(depth, self.normal))
     }
 }
 

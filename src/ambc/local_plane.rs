@@ -17,14 +17,14 @@ const MIN_SPREAD: f32 = 1.0;
 /// of this pixel, up to a relative `tolerance`; `None` where they are too few.
 #[inline(always)]
 pub fn fitted(
-    reference: &Problem,
+    problem: &Problem,
     neighbors: &Colonies,
     (x, y): (usize, usize),
     food: &FoodSource,
     tolerance: f32,
 ) -> Option<FoodSource> {
-    let ray = reference.ray(x as f32, y as f32);
-    let plane = food.plane(reference, ray);
+    let ray = problem.ray(x as f32, y as f32);
+    let plane = food.plane(problem, ray);
     let (mut count, mut places, mut squares) = (0, Vec2::ZERO, Mat2::ZERO);
     // How much larger the neighbors' inverse depths are than the plane has it, and that times their places.
     let (mut rests, mut moments) = (0.0, Vec2::ZERO);
@@ -59,6 +59,6 @@ pub fn fitted(
         slope_x: plane.slope_x + slope.x,
         slope_y: plane.slope_y + slope.y,
     };
-    let found = FoodSource::of_plane(reference, ray, &fit)?;
+    let found = FoodSource::of_plane(problem, ray, &fit)?;
     Some(FoodSource { validated: food.validated, ..found })
 }

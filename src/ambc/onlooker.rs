@@ -119,9 +119,9 @@ fn brought<S: Simd>(
     if best.depth <= 0.0 {
         return None;
     }
-    let reference = evaluator.reference();
-    let from = reference.ray(nx as f32, ny as f32);
-    let moved = best.transferred(reference, from, evaluator.ray(), (-dx as f32, -dy as f32))?;
+    let problem = evaluator.problem();
+    let from = problem.ray(nx as f32, ny as f32);
+    let moved = best.transferred(problem, from, evaluator.ray(), (-dx as f32, -dy as f32))?;
     Some(FoodSource { validated: best.validated, ..moved })
 }
 

@@ -16,7 +16,7 @@ pub fn send<S: Simd>(
 ) {
     let stalest = (1..foods.len()).max_by_key(|&index| (foods[index].trials, std::cmp::Reverse(index)));
     if let Some(index) = stalest.filter(|&index| foods[index].trials > trial_limit) {
-        let found = FoodSource::random(evaluator.reference(), evaluator.ray(), random, (0.0, 1.0));
+        let found = FoodSource::random(evaluator.problem(), evaluator.ray(), random, (0.0, 1.0));
         let cost = evaluator.cost(&found, f32::INFINITY);
         foods[index] = FoodSource { cost, ..found };
     }

@@ -33,7 +33,7 @@ pub fn band_rows(height: usize) -> usize {
 /// What one search depends on.
 pub struct Search<'a> {
     /// The view and its sources.
-    pub reference: &'a Problem<'a>,
+    pub problem: &'a Problem<'a>,
     /// Shape and weights of the patches.
     pub window: &'a Window,
     /// Aggregation of costs.
@@ -89,11 +89,11 @@ impl Search<'_> {
     }
 
     fn width(&self) -> usize {
-        self.reference.image.width
+        self.problem.image.width
     }
 
     fn height(&self) -> usize {
-        self.reference.image.height
+        self.problem.image.height
     }
 
     fn is_wanted(&self, pixel: usize) -> bool {
@@ -111,7 +111,7 @@ impl Task for SearchTask<'_> {
         let (width, height) = (search.width(), search.height());
         let mut colonies =
             [Colonies::new(width, height, search.foods), Colonies::new(width, height, search.foods)];
-        let mut sets = ViewSets::full(width * height, search.reference.sources.len());
+        let mut sets = ViewSets::full(width * height, search.problem.sources.len());
         let mut focus = sets.clone();
         let mut weak = vec![false; width * height];
         let mut counts = initialize(simd, search, &mut colonies, (&mut sets, &mut focus), &mut weak)?;
@@ -179,8 +179,8 @@ fn initialize<S: Simd>(
         Some(simd.vectorize(
             #[inline(always)]
             || {
-                let mut evaluator = Evaluator::new(simd, search.reference, search.window, search.cost_rules);
-                let mut selector = ViewSelector::new(simd, search.reference, search.view_rules);
+                let mut evaluator = Evaluator::new(simd, search.problem, search.window, search.cost_rules);
+                let mut selector = ViewSelector::new(simd, search.problem, search.view_rules);
                 let rows = band_rows.min(height - band * band_rows);
                 for (x, row) in tiled(width, rows) {
                     let y = band * band_rows + row;
@@ -219,7 +219,7 @@ fn fill_colony<S: Simd>(
     (x, y): (usize, usize),
     random: &mut Random,
 ) {
-    let reference = search.reference;
+    let problem = search.problem;
     let pixel = y * search.width() + x;
     let start = search.start.map(|start| start[pixel]).filter(|start| start.depth > 0.0);
     if let Some(start) = start {
@@ -232,7 +232,7 @@ fn fill_colony<S: Simd>(
             Some(start) => {
                 FoodSource { validated: start.validated, ..FoodSource::new(start.depth, start.normal) }
             }
-            None => FoodSource::random(reference, ray, random, (0.0, 1.0)),
+            None => FoodSource::random(problem, ray, random, (0.0, 1.0)),
         };
         colony[0] = FoodSource { cost: MAX_COST, ..food };
         return;
@@ -260,11 +260,11 @@ fn fill_colony<S: Simd>(
     for index in next..colony.len() {
         let (spread, tilt) = search.around_start;
         colony[index] = if spread > 0.0 && start.is_some_and(|start| start.validated || index == 1) {
-            colony[0].nearby(reference, ray, random, spread, tilt)
+            colony[0].nearby(problem, ray, random, spread, tilt)
         } else {
             let stratum = (index - next) as f32;
             let part = (stratum / strata, (stratum + 1.0) / strata);
-            FoodSource::random(reference, ray, random, part)
+            FoodSource::random(problem, ray, random, part)
         };
     }
     for food in &mut colony[first..] {
@@ -294,7 +294,7 @@ fn iterate<S: Simd>(
         Some(simd.vectorize(
             #[inline(always)]
             || {
-                let mut evaluator = Evaluator::new(simd, search.reference, search.window, search.cost_rules);
+                let mut evaluator = Evaluator::new(simd, search.problem, search.window, search.cost_rules);
                 let rows = band_rows.min(height - band * band_rows);
                 for (x, row) in tiled(width, rows) {
                     let y = band * band_rows + row;
@@ -330,7 +330,7 @@ fn try_fitted<S: Simd>(
     at: (usize, usize),
 ) {
     if search.plane_fit > 0.0
-        && let Some(trial) = fitted(search.reference, neighbors, at, best, search.plane_fit)
+        && let Some(trial) = fitted(search.problem, neighbors, at, best, search.plane_fit)
     {
         evaluator.challenge(best, &trial, 0.0);
     }
@@ -364,7 +364,7 @@ impl Task for AssessTask<'_> {
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let AssessTask { search, solutions } = self;
         let width = search.width();
-        let mut sets = ViewSets::empty(solutions.len(), search.reference.sources.len());
+        let mut sets = ViewSets::empty(solutions.len(), search.problem.sources.len());
         let words = sets.words_per_pixel();
         let mut cost = vec![0.0; solutions.len()];
         let mut textured = vec![false; solutions.len()];
@@ -381,8 +381,8 @@ impl Task for AssessTask<'_> {
                 #[inline(always)]
                 || {
                     let mut evaluator =
-                        Evaluator::new(simd, search.reference, search.window, search.cost_rules);
-                    let mut selector = ViewSelector::new(simd, search.reference, search.view_rules);
+                        Evaluator::new(simd, search.problem, search.window, search.cost_rules);
+                    let mut selector = ViewSelector::new(simd, search.problem, search.view_rules);
                     for place in 0..cost.len() {
                         let pixel = index * band + place;
                         let (x, y) = (pixel % width, pixel / width);

@@ -47,19 +47,13 @@ impl Surroundings {
 
     /// Looks at the best food sources of the neighbors of a pixel.
     #[inline(always)]
-    pub fn look(
-        &mut self,
-        reference: &Problem,
-        window: &Window,
-        colonies: &Colonies,
-        (x, y): (usize, usize),
-    ) {
+    pub fn look(&mut self, problem: &Problem, window: &Window, colonies: &Colonies, (x, y): (usize, usize)) {
         self.count = 0;
         if self.rules.weight == 0.0 {
             return;
         }
-        let to = reference.ray(x as f32, y as f32);
-        let center = reference.image.gray(x, y);
+        let to = problem.ray(x as f32, y as f32);
+        let center = problem.image.gray(x, y);
         for (dx, dy) in NEIGHBORS {
             let (nx, ny) = (x.wrapping_add_signed(dx as isize), y.wrapping_add_signed(dy as isize));
             if nx >= colonies.width || ny >= colonies.height {
@@ -69,9 +63,9 @@ impl Surroundings {
             if !best.validated {
                 continue;
             }
-            let from = reference.ray(nx as f32, ny as f32);
-            if let Some(moved) = best.transferred(reference, from, to, (-dx as f32, -dy as f32)) {
-                let likeness = window.likeness(center, reference.image.gray(nx, ny));
+            let from = problem.ray(nx as f32, ny as f32);
+            if let Some(moved) = best.transferred(problem, from, to, (-dx as f32, -dy as f32)) {
+                let likeness = window.likeness(center, problem.image.gray(nx, ny));
                 let weight = self.rules.weight * likeness / NEIGHBORS.len() as f32;
                 self.predictions[self.count] =
                     Prediction { depth: moved.depth, normal: moved.normal, weight };

@@ -14,12 +14,12 @@ const SAME: f32 = 0.01;
 
 /// Averages the validated solutions of a view whose sources show theirs; planes that would leave the depth range or turn
 /// away stay.
-pub fn average(level: SimdLevel, reference: &Problem, solutions: &mut [PixelEstimate]) {
-    dispatch(level, AverageTask { reference, solutions });
+pub fn average(level: SimdLevel, problem: &Problem, solutions: &mut [PixelEstimate]) {
+    dispatch(level, AverageTask { problem, solutions });
 }
 
 struct AverageTask<'a> {
-    reference: &'a Problem<'a>,
+    problem: &'a Problem<'a>,
     solutions: &'a mut [PixelEstimate],
 }
 
@@ -27,17 +27,17 @@ impl Task for AverageTask<'_> {
     type Output = ();
 
     fn run<S: Simd>(self, simd: S) {
-        let AverageTask { reference, solutions } = self;
-        let rows = solutions.par_chunks_mut(reference.image.width).enumerate();
+        let AverageTask { problem, solutions } = self;
+        let rows = solutions.par_chunks_mut(problem.image.width).enumerate();
         rows.for_each(|(y, row)| {
             simd.vectorize(
                 #[inline(always)]
                 || {
-                    let mut projector = SourceProjector::with_all_sources(simd, reference);
+                    let mut projector = SourceProjector::with_all_sources(simd, problem);
                     for (x, solution) in row.iter_mut().enumerate().filter(|(_, own)| own.validated) {
                         let (x, y) = (x as f32, y as f32);
                         projector.set_pixel(x, y);
-                        average_pixel(simd, reference, &projector, reference.ray(x, y), solution);
+                        average_pixel(simd, problem, &projector, problem.ray(x, y), solution);
                     }
                 },
             );
@@ -49,7 +49,7 @@ impl Task for AverageTask<'_> {
 #[inline(always)]
 fn average_pixel<S: Simd>(
     simd: S,
-    reference: &Problem,
+    problem: &Problem,
     projector: &SourceProjector<'_, S>,
     ray: Vec3,
     solution: &mut PixelEstimate,
@@ -73,7 +73,7 @@ fn average_pixel<S: Simd>(
         weights = simd.add(weights, weight);
         inverse_depths = simd.mul_add(weight, inverse_depth, inverse_depths);
         let slopes = [simd.select(same, found.slope_x, zero), simd.select(same, found.slope_y, zero)];
-        let normal = facing_normals(simd, reference, ray, inverse_depth, slopes);
+        let normal = facing_normals(simd, problem, ray, inverse_depth, slopes);
         for (sum, axis) in normals.iter_mut().zip(normal) {
             *sum = simd.mul_add(weight, axis, *sum);
         }
@@ -83,7 +83,7 @@ fn average_pixel<S: Simd>(
     let [x, y, z] = normals;
     let normal = solution.normal + Vec3::new(simd.reduce_sum(x), simd.reduce_sum(y), simd.reduce_sum(z));
     let normal = normal.normalize_or_zero();
-    let is_in_range = depth >= reference.near && depth <= reference.far;
+    let is_in_range = depth >= problem.range.near && depth <= problem.range.far;
     if weights > 1.0 && is_in_range && normal.dot(ray) < -MIN_FACING {
         *solution = PixelEstimate { depth, normal, ..*solution };
     }
@@ -94,15 +94,15 @@ fn average_pixel<S: Simd>(
 #[inline(always)]
 fn facing_normals<S: Simd>(
     simd: S,
-    reference: &Problem,
+    problem: &Problem,
     ray: Vec3,
     inverse_depth: S::F32,
     [slope_x, slope_y]: [S::F32; 2],
 ) -> [S::F32; 3] {
     let depth = simd.div(simd.splat(1.0), inverse_depth);
     // The normals over their products with the ray.
-    let x = simd.mul(simd.mul(slope_x, depth), simd.splat(1.0 / reference.inverse_focal.0));
-    let y = simd.mul(simd.mul(slope_y, depth), simd.splat(1.0 / reference.inverse_focal.1));
+    let x = simd.mul(simd.mul(slope_x, depth), simd.splat(1.0 / problem.inverse_focal.0));
+    let y = simd.mul(simd.mul(slope_y, depth), simd.splat(1.0 / problem.inverse_focal.1));
     let z = simd.sub(simd.splat(1.0), simd.mul_add(x, simd.splat(ray.x), simd.mul(y, simd.splat(ray.y))));
     let square = simd.mul_add(x, x, simd.mul_add(y, y, simd.mul(z, z)));
     let scale = simd.div(simd.splat(-1.0), simd.sqrt(square));
@@ -149,7 +149,7 @@ mod tests {
     fn exact_depths_stay() {
         let (world, mut solutions) = spoiled(|_, _| 1.0);
         let before = solutions.clone();
-        average(SimdLevel::detect(), &world.reference(), &mut solutions);
+        average(SimdLevel::detect(), &world.problem(), &mut solutions);
         for (solution, before) in solutions.iter().zip(&before) {
             assert!((solution.depth / before.depth - 1.0).abs() < 1e-5, "{solution:?} was {before:?}");
             assert!((solution.normal - before.normal).length() < 3e-3, "{solution:?} was {before:?}");
@@ -162,7 +162,7 @@ mod tests {
     fn errors_of_five_views_average_out() {
         let (world, mut solutions) = spoiled(|_, random| 1.0 + 0.002 * random.signed());
         let before = error(&world, &solutions);
-        average(SimdLevel::detect(), &world.reference(), &mut solutions);
+        average(SimdLevel::detect(), &world.problem(), &mut solutions);
         let after = error(&world, &solutions);
         // One over the square root of five, and what views do not see.
         assert!(after < 0.55 * before, "{before} to {after}");
@@ -173,12 +173,12 @@ mod tests {
         let (world, mut solutions) = spoiled(|view, _| if view > 0 { 1.03 } else { 1.001 });
         solutions[100].validated = false;
         let before = solutions.clone();
-        average(SimdLevel::detect(), &world.reference(), &mut solutions);
+        average(SimdLevel::detect(), &world.problem(), &mut solutions);
         assert_eq!(solutions, before);
         let (nearer, mut solutions) = spoiled(|view, _| if view > 0 { 1.003 } else { 1.0 });
         solutions[100].validated = false;
         let before = solutions.clone();
-        average(SimdLevel::detect(), &nearer.reference(), &mut solutions);
+        average(SimdLevel::detect(), &nearer.problem(), &mut solutions);
         assert_eq!(solutions[100], before[100]);
         assert!(solutions[101].depth > 1.001 * before[101].depth);
     }
@@ -187,10 +187,10 @@ mod tests {
     fn depths_stay_in_the_range() {
         let (world, mut solutions) = spoiled(|view, _| if view > 0 { 1.004 } else { 1.0 });
         let before = solutions.clone();
-        let mut reference = world.reference();
-        reference.far = before.iter().map(|solution| solution.depth).fold(0.0, f32::max);
-        average(SimdLevel::detect(), &reference, &mut solutions);
-        assert!(solutions.iter().all(|solution| solution.depth <= reference.far));
+        let mut problem = world.problem();
+        problem.range.far = before.iter().map(|solution| solution.depth).fold(0.0, f32::max);
+        average(SimdLevel::detect(), &problem, &mut solutions);
+        assert!(solutions.iter().all(|solution| solution.depth <= problem.range.far));
         assert!(solutions.iter().zip(&before).any(|(solution, before)| solution == before));
         assert!(solutions.iter().zip(&before).any(|(solution, before)| solution != before));
     }

@@ -81,19 +81,19 @@ impl ConsistencyRules {
 /// [`Error::Cancelled`].
 pub fn check(
     level: SimdLevel,
-    reference: &Problem,
+    problem: &Problem,
     map: &PlaneMap,
     sources: &[Option<&PlaneMap>],
     rules: &ConsistencyRules,
     cancelled: Cancelled,
 ) -> Result<Vec<(u8, bool)>> {
     let found = sources.iter().map(|found| found.map_or(&[][..], |found| &found.solutions)).collect();
-    dispatch(level, CheckTask { reference, map, found, rules, cancelled })
+    dispatch(level, CheckTask { problem, map, found, rules, cancelled })
 }
 
 /// A check, eight sources at a time.
 struct CheckTask<'a> {
-    reference: &'a Problem<'a>,
+    problem: &'a Problem<'a>,
     map: &'a PlaneMap,
     /// What the sources found, nothing of those that cannot speak.
     found: Vec<&'a [PixelEstimate]>,
@@ -108,8 +108,8 @@ impl Task for CheckTask<'_> {
     type Output = Result<Vec<(u8, bool)>>;
 
     fn run<S: Simd>(self, simd: S) -> Self::Output {
-        let CheckTask { reference, map, .. } = &self;
-        let width = reference.image.width;
+        let CheckTask { problem, map, .. } = &self;
+        let width = problem.image.width;
         let mut verdicts = vec![(0, false); map.solutions.len()];
         let bands = verdicts.par_chunks_mut(BAND_ROWS * width).enumerate();
         bands.try_for_each(|(band, verdicts)| {
@@ -119,7 +119,7 @@ impl Task for CheckTask<'_> {
             simd.vectorize(
                 #[inline(always)]
                 || {
-                    let mut projector = SourceProjector::with_all_sources(simd, reference);
+                    let mut projector = SourceProjector::with_all_sources(simd, problem);
                     for (row, verdicts) in verdicts.chunks_exact_mut(width).enumerate() {
                         let y = band * BAND_ROWS + row;
                         for (x, verdict) in verdicts.iter_mut().enumerate() {
@@ -172,7 +172,7 @@ impl CheckTask<'_> {
                 let lane = rest.trailing_zeros() as usize % LANES;
                 rest &= rest - 1;
                 let source = index * LANES + lane;
-                let normal = self.reference.sources[source].rotation * solution.normal;
+                let normal = self.problem.sources[source].rotation * solution.normal;
                 let own = self.found[source][places[lane] as usize].normal;
                 consistent += usize::from(self.rules.agree(normal, own));
             }
@@ -274,7 +274,7 @@ mod tests {
         let sources: Vec<Option<&PlaneMap>> = maps[1..].iter().map(Some).collect();
         let rules = ConsistencyRules::new(&abstaining(occluders_abstain));
         let verdicts =
-            check(SimdLevel::detect(), &world.reference(), &maps[0], &sources, &rules, &|| false).unwrap();
+            check(SimdLevel::detect(), &world.problem(), &maps[0], &sources, &rules, &|| false).unwrap();
         assert_eq!(verdicts.len(), maps[0].solutions.len());
         verdicts[14 * 36 + 18]
     }
@@ -305,7 +305,7 @@ mod tests {
         let mut verdicts = |sets: ViewSets| {
             maps[0].sets = sets;
             let sources: Vec<Option<&PlaneMap>> = maps[1..].iter().map(Some).collect();
-            check(SimdLevel::detect(), &world.reference(), &maps[0], &sources, &rules, &|| false).unwrap()
+            check(SimdLevel::detect(), &world.problem(), &maps[0], &sources, &rules, &|| false).unwrap()
         };
         let middle = 14 * 36 + 18;
         assert_eq!(verdicts(one)[middle], (1, false));
@@ -324,7 +324,7 @@ mod tests {
         let sources: Vec<Option<&PlaneMap>> = maps[1..].iter().map(Some).collect();
         let rules = ConsistencyRules::new(&abstaining(true));
         assert_eq!(
-            check(SimdLevel::detect(), &world.reference(), &maps[0], &sources, &rules, &|| false).unwrap()
+            check(SimdLevel::detect(), &world.problem(), &maps[0], &sources, &rules, &|| false).unwrap()
                 [14 * 36 + 18],
             (0, false)
         );

@@ -27,6 +27,35 @@ impl DepthRange {
     }
 }
 
+/// A [`DepthRange`] in the solver's f32.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SearchRange {
+    /// The smallest depth.
+    pub near: f32,
+    /// The largest depth.
+    pub far: f32,
+}
+
+impl From<DepthRange> for SearchRange {
+    fn from(range: DepthRange) -> SearchRange {
+        SearchRange { near: range.near as f32, far: range.far as f32 }
+    }
+}
+
+impl SearchRange {
+    /// Whether a depth lies within it; not where the depth is not a number.
+    #[inline(always)]
+    pub fn contains(&self, depth: f32) -> bool {
+        depth >= self.near && depth <= self.far
+    }
+
+    /// The nearest depth within it.
+    #[inline(always)]
+    pub fn clamp(&self, depth: f32) -> f32 {
+        depth.clamp(self.near, self.far)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

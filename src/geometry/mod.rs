@@ -5,12 +5,15 @@
 
 mod camera;
 mod depth_range;
+mod grid;
 mod plane;
 mod relative_pose;
 mod view_set;
 
 pub use camera::Camera;
-pub use depth_range::DepthRange;
-pub use plane::{MIN_FACING, Plane, SlantedPlane};
+pub use depth_range::{DepthRange, SearchRange};
+pub(crate) use grid::{Grid, Offset, Position};
+pub(crate) use plane::{MIN_FACING, PlaneHypothesis};
+pub use plane::{Plane, SlantedPlane};
 pub use relative_pose::{RelativePose, plane_homography};
 pub use view_set::ViewSets;

@@ -1,6 +1,6 @@
 //! Planes: in f64 by normal and distance, in f32 by what the solver keeps of them.
 
-use super::Camera;
+use super::{Camera, SearchRange};
 use glam::{DVec2, DVec3, Vec3};
 
 /// The smallest `-n . ray` of a plane that faces the camera: flatter ones have no stable homography.
@@ -66,5 +66,42 @@ impl SlantedPlane {
     #[inline(always)]
     pub fn inverse_depth_at(&self, dx: f32, dy: f32) -> f32 {
         self.inverse_depth + self.slope_x * dx + self.slope_y * dy
+    }
+}
+
+/// A plane at a pixel as the solver keeps it: the depth at the pixel and the normal, so that the same plane at another
+/// pixel is a transfer and clamping to the depth range is exact.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct PlaneHypothesis {
+    /// Depth at the pixel, 0 where there is none.
+    pub depth: f32,
+    /// Unit normal in the camera frame, facing the camera.
+    pub normal: Vec3,
+}
+
+impl PlaneHypothesis {
+    /// Whether the depth lies within the range and the normal faces the camera along the pixel's ray.
+    #[inline(always)]
+    pub fn is_usable(&self, ray: Vec3, range: &SearchRange) -> bool {
+        range.contains(self.depth) && self.normal.dot(ray) < -MIN_FACING
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plane_is_usable_within_the_range_and_facing_the_camera() {
+        let range = SearchRange { near: 2.0, far: 5.0 };
+        let is_usable = |depth, normal: Vec3| {
+            PlaneHypothesis { depth, normal: normal.normalize() }.is_usable(Vec3::new(0.5, 0.0, 1.0), &range)
+        };
+        assert!(is_usable(2.0, Vec3::NEG_Z) && is_usable(5.0, Vec3::NEG_Z));
+        for depth in [1.99, 5.01, 0.0, f32::NAN, f32::INFINITY] {
+            assert!(!is_usable(depth, Vec3::NEG_Z), "{depth}");
+        }
+        // Perpendicular to the ray, and turned away.
+        assert!(!is_usable(3.0, Vec3::new(1.0, 0.0, -0.5)) && !is_usable(3.0, Vec3::Z));
     }
 }

@@ -1,8 +1,6 @@
 //! A reference view and its source views on one scale, in f32 and in the reference camera's frame.
 
-use crate::geometry::Camera;
-use crate::geometry::DepthRange;
-use crate::geometry::RelativePose;
+use crate::geometry::{Camera, DepthRange, RelativePose, SearchRange};
 use crate::image::PackedImage;
 use crate::scene::CompactPlane;
 use glam::{Mat3, Vec3};
@@ -16,10 +14,8 @@ pub struct Problem<'a> {
     pub inverse_focal: (f32, f32),
     /// cx and cy.
     pub principal: (f32, f32),
-    /// Smallest depth searched.
-    pub near: f32,
-    /// Largest depth searched.
-    pub far: f32,
+    /// The depths searched.
+    pub range: SearchRange,
     /// Its source views, in the order of its list.
     pub sources: Vec<Source<'a>>,
 }
@@ -46,8 +42,7 @@ impl<'a> Problem<'a> {
             image,
             inverse_focal: ((1.0 / camera.fx) as f32, (1.0 / camera.fy) as f32),
             principal: (camera.cx as f32, camera.cy as f32),
-            near: range.near as f32,
-            far: range.far as f32,
+            range: range.into(),
             sources: Vec::new(),
         }
     }

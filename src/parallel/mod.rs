@@ -1,5 +1,14 @@
-//! Threads.
+//! Threads: the pool that ends with its owner, the one loop over bands of rows, and the callback that counts work and
+//! cancels it.
 
+mod bands;
 mod pool;
 
+pub use bands::{Bands, run_bands};
 pub use pool::JoinedPool;
+
+use crate::error::Result;
+
+/// Told by whatever takes longer than a moment how many units of work are done, from any thread;
+/// [`Error::Cancelled`](crate::Error::Cancelled) ends the work. What a unit is, the caller says.
+pub type Advance<'a> = &'a (dyn Fn(u64) -> Result<()> + Sync);

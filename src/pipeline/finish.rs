@@ -45,10 +45,10 @@ impl Stepper {
     }
 
     /// The validated planes of a view, averaged with those that its sources show.
-    fn averaged(&self, own: &ViewEstimate, reference: &Problem) -> Vec<PixelEstimate> {
+    fn averaged(&self, own: &ViewEstimate, problem: &Problem) -> Vec<PixelEstimate> {
         let mut solutions = own.solved.solutions.clone();
         if self.options.refine.cross_view_averaging {
-            average(self.level, reference, &mut solutions);
+            average(self.level, problem, &mut solutions);
         }
         solutions
     }
@@ -64,19 +64,18 @@ impl Stepper {
         if !self.options.refine.fill_gaps {
             return Ok(Vec::new());
         }
-        let reference = self.reference(cycle, view, &|view| surface_of(estimates, view));
+        let problem = self.problem(cycle, view, &|view| surface_of(estimates, view));
         let ScaledView { camera, image, range, .. } = self.scaled(cycle, view);
-        let candidates = closing::candidates(camera, image, *range, &self.averaged(own, &reference));
-        let mut sets = ViewSets::empty(candidates.len(), reference.sources.len());
+        let candidates = closing::candidates(camera, image, *range, &self.averaged(own, &problem));
+        let mut sets = ViewSets::empty(candidates.len(), problem.sources.len());
         let made = candidates.iter().enumerate().filter(|(_, offer)| offer.depth > 0.0);
         let made: Vec<_> = made.map(|(pixel, offer)| (pixel, offer.depth, offer.normal)).collect();
-        select_sets(&reference, ViewRules::new(&self.options, 0), &mut sets, &made);
+        select_sets(&problem, ViewRules::new(&self.options, 0), &mut sets, &made);
         let offered = PlaneMap { solutions: candidates, sets, ..PlaneMap::default() };
         let sources = self.found_by_sources(view, estimates);
         // What is offered has no cost of its own that speaks for it: the sources must agree more closely.
         let rules = ConsistencyRules::new(&self.options).closer();
-        let verdicts =
-            consistency::check(self.level, &reference, &offered, &sources, &rules, &|| advance(0))?;
+        let verdicts = consistency::check(self.level, &problem, &offered, &sources, &rules, &|| advance(0))?;
         let closed =
             (0u32..).zip(offered.solutions.iter().zip(verdicts)).filter(|(_, (_, verdict))| verdict.1);
         let closed = closed.map(|(pixel, (&offer, (consistent, validated)))| {
@@ -94,13 +93,13 @@ impl Stepper {
         advance: &(dyn Fn(u64) -> bool + Sync),
     ) -> Result<ViewResult> {
         let (cycle, view) = (self.all().len() - 1, own.view());
-        let reference = self.reference(cycle, view, surfaces);
+        let problem = self.problem(cycle, view, surfaces);
         let cancelled = || advance(0);
-        let mut search = self.plain_search(cycle, &reference, true, &cancelled);
+        let mut search = self.plain_search(cycle, &problem, true, &cancelled);
         // A set that falls back to the start set would hide that nothing sees the solution.
         search.view_rules = ViewRules::new(&self.options, 0);
         // Averaged once more: kept since the gaps were closed, those of all views would take half as much memory again.
-        let mut solutions = self.averaged(own, &reference);
+        let mut solutions = self.averaged(own, &problem);
         closings.iter().for_each(|&(pixel, closed)| solutions[pixel as usize] = closed);
         let assessment = assess(&search, &solutions)?;
         let mut counts = own.counts();

@@ -158,7 +158,7 @@ impl Stepper {
         } else {
             let start = own.map(|own| &own.solved.solutions[..]);
             let candidates = candidates.and_then(Candidates::by_pixel);
-            let reference = self.reference(cycle, view, shown.surfaces);
+            let problem = self.problem(cycle, view, shown.surfaces);
             // A band of one color has half of its pixels.
             let band = camera.width as usize * band_rows(camera.height as usize);
             let cancelled = || advance(band as u64 * u64::from(schedule.scale.food_sources) / 2);
@@ -171,16 +171,16 @@ impl Stepper {
                 iterations: schedule.iterations(),
                 around_start: self.around_start(schedule.cycle),
                 stream: stream(&[self.options.seed, view as u64, schedule.scale_index as u64, cycle_number]),
-                ..self.plain_search(cycle, &reference, shown.is_guided, &cancelled)
+                ..self.plain_search(cycle, &problem, shown.is_guided, &cancelled)
             };
             let mut found = search.run()?;
-            let filled = fill(&reference, &mut found.best, &found.weak);
+            let filled = fill(&problem, &mut found.best, &found.weak);
             let plane = |&pixel: &usize| {
                 let FoodSource { depth, normal, .. } = found.best[pixel];
                 (pixel, depth, normal)
             };
             let filled: Vec<_> = filled.iter().map(plane).collect();
-            select_sets(&reference, search.view_rules, &mut found.sets, &filled);
+            select_sets(&problem, search.view_rules, &mut found.sets, &filled);
             estimate.counts += found.counts;
             let solution = |food: &FoodSource| PixelEstimate {
                 depth: food.depth,
@@ -228,10 +228,10 @@ impl Stepper {
             return Err(missing(view));
         };
         own.require_marked(&format!("estimates[{view}]"), false)?;
-        let reference = self.reference(cycle, view, &|view| surface_of(estimates, view));
+        let problem = self.problem(cycle, view, &|view| surface_of(estimates, view));
         let sources = self.found_by_sources(view, estimates);
         let rules = ConsistencyRules::new(&self.options);
-        Ok(Verdicts(consistency::check(self.level, &reference, &own.solved, &sources, &rules, cancelled)?))
+        Ok(Verdicts(consistency::check(self.level, &problem, &own.solved, &sources, &rules, cancelled)?))
     }
 
     /// What each source view of a view found, `None` of one without a estimate.
@@ -297,7 +297,7 @@ impl Stepper {
     pub(super) fn plain_search<'b>(
         &'b self,
         cycle: usize,
-        reference: &'b Problem<'b>,
+        problem: &'b Problem<'b>,
         is_guided: bool,
         cancelled: &'b (dyn Fn() -> bool + Sync),
     ) -> Search<'b> {
@@ -307,7 +307,7 @@ impl Stepper {
             _ => self.options.min_matched_views(),
         };
         Search {
-            reference,
+            problem,
             window: self.window(cycle),
             cost_rules: CostRules::new(&self.options, is_guided),
             view_rules: ViewRules::new(&self.options, min_views),
@@ -347,20 +347,20 @@ impl Stepper {
     }
 
     /// A view and its sources, which show their validated surfaces as far as there are any.
-    pub(super) fn reference<'b>(
+    pub(super) fn problem<'b>(
         &'b self,
         cycle: usize,
         view: usize,
         surfaces: &dyn Fn(usize) -> &'b [CompactPlane],
     ) -> Problem<'b> {
         let ScaledView { camera, image, range, .. } = self.scaled(cycle, view);
-        let mut reference = Problem::new(camera, image, *range);
+        let mut problem = Problem::new(camera, image, *range);
         for &source in self.sources(view) {
             let source = source as usize;
             let ScaledView { camera: other, image, .. } = self.scaled(cycle, source);
-            reference.sources.push(Source::new(camera, other, image, surfaces(source)));
+            problem.sources.push(Source::new(camera, other, image, surfaces(source)));
         }
-        reference
+        problem
     }
 }
 

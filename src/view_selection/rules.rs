@@ -73,7 +73,7 @@ impl ViewRules {
 #[derive(Debug, Clone)]
 pub struct ViewSelector<'a, S: Simd> {
     simd: S,
-    reference: &'a Problem<'a>,
+    problem: &'a Problem<'a>,
     rules: ViewRules,
     /// Of all sources.
     projector: SourceProjector<'a, S>,
@@ -83,17 +83,17 @@ pub struct ViewSelector<'a, S: Simd> {
 
 impl<'a, S: Simd> ViewSelector<'a, S> {
     /// A selector for the pixels of a view.
-    pub fn new(simd: S, reference: &'a Problem<'a>, rules: ViewRules) -> ViewSelector<'a, S> {
+    pub fn new(simd: S, problem: &'a Problem<'a>, rules: ViewRules) -> ViewSelector<'a, S> {
         let lanes = |sources: &[Source], axis: usize| -> Lanes {
             std::array::from_fn(|lane| sources.get(lane).map_or(0.0, |source| source.center[axis]))
         };
         let centers = |sources: &[Source]| std::array::from_fn(|axis| lanes(sources, axis));
-        let centers = reference.sources.chunks(LANES).map(centers).collect();
+        let centers = problem.sources.chunks(LANES).map(centers).collect();
         ViewSelector {
             simd,
-            reference,
+            problem,
             rules,
-            projector: SourceProjector::with_all_sources(simd, reference),
+            projector: SourceProjector::with_all_sources(simd, problem),
             centers,
         }
     }
@@ -102,10 +102,10 @@ impl<'a, S: Simd> ViewSelector<'a, S> {
     /// neither at grazing incidence nor occluded.
     #[inline(always)]
     pub fn select(&mut self, set: &mut [u32], (x, y): (f32, f32), depth: f32, normal: Vec3) {
-        let ViewSelector { simd, reference, rules, projector, centers } = self;
+        let ViewSelector { simd, problem, rules, projector, centers } = self;
         set.fill(0);
         projector.set_pixel(x, y);
-        let point = reference.ray(x, y) * depth;
+        let point = problem.ray(x, y) * depth;
         let mut kept = 0;
         for (index, (group, centers)) in projector.groups().iter().zip(centers).enumerate() {
             let projections = group.project(*simd, depth);
@@ -121,14 +121,14 @@ impl<'a, S: Simd> ViewSelector<'a, S> {
             kept += seen.count_ones() as usize;
         }
         if kept < rules.min_views {
-            ViewSets::fill_words(set, reference.sources.len());
+            ViewSets::fill_words(set, problem.sources.len());
         }
     }
 }
 
 /// Selects the sets of some pixels, given with depth and normal of their solutions.
 pub fn select_sets(
-    reference: &Problem,
+    problem: &Problem,
     rules: ViewRules,
     sets: &mut ViewSets,
     solutions: &[(usize, f32, Vec3)],
@@ -139,9 +139,9 @@ pub fn select_sets(
         selected.par_chunks_mut(SELECTED_AT_ONCE * words).zip(solutions.par_chunks(SELECTED_AT_ONCE));
     groups.for_each(|(selected, solutions)| {
         // Every back-end gives the same bits.
-        let mut selector = ViewSelector::new(Scalar, reference, rules);
+        let mut selector = ViewSelector::new(Scalar, problem, rules);
         for (set, &(pixel, depth, normal)) in selected.chunks_exact_mut(words).zip(solutions) {
-            let at = ((pixel % reference.image.width) as f32, (pixel / reference.image.width) as f32);
+            let at = ((pixel % problem.image.width) as f32, (pixel / problem.image.width) as f32);
             selector.select(set, at, depth, normal);
         }
     });

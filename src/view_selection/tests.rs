@@ -31,7 +31,7 @@ fn blank() -> Picture {
 /// A reference camera in front of the point with sources around it.
 struct Views {
     image: PackedImage,
-    reference: Camera,
+    problem: Camera,
     sources: Vec<Camera>,
     /// The validated solutions of each source.
     surfaces: Vec<Vec<CompactPlane>>,
@@ -40,8 +40,8 @@ struct Views {
 impl Views {
     fn new(sources: Vec<Camera>) -> Views {
         let surfaces = vec![Vec::new(); sources.len()];
-        let reference = turned(0.0, f64::from(DEPTH));
-        Views { image: PackedImage::new(&blank()), reference, sources, surfaces }
+        let problem = turned(0.0, f64::from(DEPTH));
+        Views { image: PackedImage::new(&blank()), problem, sources, surfaces }
     }
 
     fn at_angles(angles: &[f64]) -> Views {
@@ -50,13 +50,13 @@ impl Views {
 
     /// The view set of the middle pixel for a plane with this normal.
     fn set(&self, options: &Options, min_views: usize, normal: Vec3) -> Vec<usize> {
-        let mut reference = Problem::new(&self.reference, &self.image, RANGE);
+        let mut problem = Problem::new(&self.problem, &self.image, RANGE);
         let sources = self.sources.iter().zip(&self.surfaces);
-        reference.sources =
-            sources.map(|(camera, s)| Source::new(&self.reference, camera, &self.image, s)).collect();
+        problem.sources =
+            sources.map(|(camera, s)| Source::new(&self.problem, camera, &self.image, s)).collect();
         let mut words = vec![0u32; self.sources.len().div_ceil(32)];
         let rules = ViewRules::new(options, min_views);
-        ViewSelector::new(Scalar, &reference, rules).select(&mut words, CENTER, DEPTH, normal);
+        ViewSelector::new(Scalar, &problem, rules).select(&mut words, CENTER, DEPTH, normal);
         let bit = |place: &usize| words[place / 32] >> (place % 32) & 1 != 0;
         (0..32 * words.len()).filter(bit).collect()
     }
@@ -333,7 +333,7 @@ struct Placement {
 
 /// Where the planes of a pixel fall in the sources of a set, which is taken on the way to the pixel or afterwards.
 struct Place<'a> {
-    reference: &'a Problem<'a>,
+    problem: &'a Problem<'a>,
     pixel: (f32, f32),
     set: &'a [u32],
     planes: &'a [SlantedPlane],
@@ -344,8 +344,8 @@ impl Task for Place<'_> {
     type Output = Vec<Vec<Placement>>;
 
     fn run<S: Simd>(self, simd: S) -> Self::Output {
-        let Place { reference, pixel: (x, y), set, planes, afterwards } = self;
-        let mut projector = SourceProjector::new(simd, reference);
+        let Place { problem, pixel: (x, y), set, planes, afterwards } = self;
+        let mut projector = SourceProjector::new(simd, problem);
         projector.set_pixel_and_views(x, y, if afterwards { &[0x3ff] } else { set });
         if afterwards {
             projector.set_views(set);
@@ -356,7 +356,7 @@ impl Task for Place<'_> {
                 let projections = group.project(simd, 1.0 / plane.inverse_depth);
                 let slopes = group.slopes(simd, plane);
                 assert_eq!(projections.inside.checked_shr(group.sources().len() as u32).unwrap_or(0), 0);
-                assert_is_within(&projections, reference, group.sources());
+                assert_is_within(&projections, problem, group.sources());
                 for (lane, &source) in group.sources().iter().enumerate() {
                     if projections.inside >> lane & 1 != 0 {
                         let (x, y) = (projections.column[lane], projections.row[lane]);
@@ -376,9 +376,9 @@ impl Task for Place<'_> {
 }
 
 /// Columns and rows are within the images also where the hypothesis is not.
-fn assert_is_within(projections: &Projections, reference: &Problem, sources: &[usize]) {
+fn assert_is_within(projections: &Projections, problem: &Problem, sources: &[usize]) {
     for lane in 0..LANES {
-        let image = sources.get(lane).map(|&source| reference.sources[source].image);
+        let image = sources.get(lane).map(|&source| problem.sources[source].image);
         let (right, bottom) =
             image.map_or((0.0, 0.0), |image| ((image.width - 1) as f32, (image.height - 1) as f32));
         assert!((0.0..=right).contains(&projections.column[lane]), "lane {lane}: {projections:?}");
@@ -391,10 +391,9 @@ fn eight_sources_at_once_are_found_where_each_alone_is() {
     let angles: Vec<f64> = (0..11).map(|view| f64::from(view) * 34.0 - 170.0).collect();
     let mut views = Views::at_angles(&angles);
     views.sources[3].cx += 15.0;
-    let mut reference = Problem::new(&views.reference, &views.image, RANGE);
-    reference.sources = (views.sources.iter())
-        .map(|camera| Source::new(&views.reference, camera, &views.image, &[]))
-        .collect();
+    let mut problem = Problem::new(&views.problem, &views.image, RANGE);
+    problem.sources =
+        (views.sources.iter()).map(|camera| Source::new(&views.problem, camera, &views.image, &[])).collect();
     let planes: Vec<SlantedPlane> = [0.001, 1.0, 2.5, 3.9, DEPTH, 4.1, 5.0, 8.0, 1e6]
         .map(|depth| SlantedPlane { inverse_depth: 1.0 / depth, slope_x: 0.003, slope_y: -0.007 })
         .into();
@@ -404,12 +403,12 @@ fn eight_sources_at_once_are_found_where_each_alone_is() {
             let expected: Vec<Vec<Placement>> = (planes.iter())
                 .map(|plane| {
                     let place = |source: usize| {
-                        let Source { pose, .. } = &reference.sources[source];
+                        let Source { pose, .. } = &problem.sources[source];
                         // The depth goes there and back, as it does for food sources.
                         let plane =
                             SlantedPlane { inverse_depth: 1.0 / (1.0 / plane.inverse_depth), ..*plane };
                         let homography = PatchHomography::of_plane(&pose, pose.at_infinity(x, y), &plane);
-                        let at = reference.sources[source].project(homography.center)?;
+                        let at = problem.sources[source].project(homography.center)?;
                         Some(Placement { source, homography, x: at.x, y: at.y })
                     };
                     (0..11).filter(|source| set >> source & 1 != 0).filter_map(place).collect()
@@ -419,8 +418,8 @@ fn eight_sources_at_once_are_found_where_each_alone_is() {
             outside += expected.iter().map(|found| set.count_ones() as usize - found.len()).sum::<usize>();
             for level in SimdLevel::ALL.into_iter().filter(|level| level.is_available()) {
                 for afterwards in [false, true] {
-                    let (reference, pixel, set) = (&reference, (x, y), &[set][..]);
-                    let task = Place { reference, pixel, set, planes: &planes, afterwards };
+                    let (problem, pixel, set) = (&problem, (x, y), &[set][..]);
+                    let task = Place { problem, pixel, set, planes: &planes, afterwards };
                     assert_eq!(dispatch(level, task), expected, "{}", level.name());
                 }
             }

@@ -17,8 +17,8 @@ const ALL: usize = usize::MAX;
 #[test]
 fn employed_bees_keep_only_what_is_better_and_count_their_trials() {
     let (world, window) = (World::five(), window());
-    let reference = world.reference();
-    let mut evaluator = standing(&reference, &window, &options(), false);
+    let problem = world.problem();
+    let mut evaluator = standing(&problem, &window, &options(), false);
     let mut foods = [1.0, 1.1, 0.7, 1.5].map(|factor| evaluated(&mut evaluator, wall(&world, PIXEL, factor)));
     let mut random = Random::new(1, 2);
     let mut improved = 0;
@@ -43,20 +43,20 @@ fn employed_bees_keep_only_what_is_better_and_count_their_trials() {
 #[test]
 fn employed_bees_stay_in_the_depth_range_and_on_the_visible_side() {
     let (world, window) = (World::five(), window());
-    let reference = world.reference();
-    let mut evaluator = standing(&reference, &window, &options(), false);
+    let problem = world.problem();
+    let mut evaluator = standing(&problem, &window, &options(), false);
     let ray = evaluator.ray();
     let grazing = [Vec3::new(-0.99, 0.0, -0.2), Vec3::new(0.99, 0.1, -0.2)].map(|normal| normal.normalize());
     let mut kept = 0;
     for seed in 0..2000 {
         // Costs that anything improves on: every valid trial is kept.
         let mut foods = [
-            FoodSource { cost: 9.0, ..FoodSource::new(reference.near, grazing[0]) },
-            FoodSource { cost: 9.0, ..FoodSource::new(reference.far, grazing[1]) },
+            FoodSource { cost: 9.0, ..FoodSource::new(problem.range.near, grazing[0]) },
+            FoodSource { cost: 9.0, ..FoodSource::new(problem.range.far, grazing[1]) },
         ];
         employed::send(&mut evaluator, &mut foods, ALL, &mut Random::new(7, seed));
         for food in foods {
-            assert!((reference.near..=reference.far).contains(&food.depth), "{food:?}");
+            assert!((problem.range.near..=problem.range.far).contains(&food.depth), "{food:?}");
             assert!(food.normal.dot(ray) < -MIN_FACING, "{food:?}");
             assert!((food.normal.length() - 1.0).abs() < 1e-5);
             kept += usize::from(food.cost < 9.0);
@@ -68,8 +68,8 @@ fn employed_bees_stay_in_the_depth_range_and_on_the_visible_side() {
 #[test]
 fn employed_bees_work_on_the_first_food_sources_only_where_they_are_told_so() {
     let (world, window) = (World::five(), window());
-    let reference = world.reference();
-    let mut evaluator = standing(&reference, &window, &options(), false);
+    let problem = world.problem();
+    let mut evaluator = standing(&problem, &window, &options(), false);
     let before = [1.0, 1.1, 0.7].map(|factor| evaluated(&mut evaluator, wall(&world, PIXEL, factor)));
     let mut foods = before;
     employed::send(&mut evaluator, &mut foods, 1, &mut Random::new(1, 2));
@@ -101,8 +101,8 @@ fn neighbors(world: &World, factor: f32, validated: bool) -> Colonies {
 #[test]
 fn onlookers_bring_a_neighbor_s_plane_to_the_pixel() {
     let (world, window) = (World::five(), window());
-    let reference = world.reference();
-    let mut evaluator = standing(&reference, &window, &options(), false);
+    let problem = world.problem();
+    let mut evaluator = standing(&problem, &window, &options(), false);
     let neighbors = neighbors(&world, 1.0, false);
     let wrong = evaluated(&mut evaluator, wall(&world, PIXEL, 1.2));
     for seed in 0..100 {
@@ -119,8 +119,8 @@ fn onlookers_bring_a_neighbor_s_plane_to_the_pixel() {
 #[test]
 fn of_the_neighbors_drawn_the_one_of_the_cheapest_plane_is_visited() {
     let (world, window) = (World::five(), window());
-    let reference = world.reference();
-    let mut evaluator = standing(&reference, &window, &options(), false);
+    let problem = world.problem();
+    let mut evaluator = standing(&problem, &window, &options(), false);
     // The neighbors to the left know the wall, the others a plane that costs them more.
     let mut neighbors = neighbors(&world, 1.0, false);
     for (x, y) in (0..28).flat_map(|y| (PIXEL.0..36).map(move |x| (x, y))) {
@@ -149,13 +149,13 @@ fn of_the_neighbors_drawn_the_one_of_the_cheapest_plane_is_visited() {
 fn of_equally_cheap_planes_the_one_of_the_neighbor_that_looks_most_alike_is_visited() {
     let world = World::five();
     let window = Window::new(5, 2, 5.0, 0.03, 1e-5);
-    let reference = world.reference();
-    let mut evaluator = standing(&reference, &window, &options(), false);
+    let problem = world.problem();
+    let mut evaluator = standing(&problem, &window, &options(), false);
     let place = |(dx, dy): (i32, i32)| {
         (PIXEL.0.wrapping_add_signed(dx as isize), PIXEL.1.wrapping_add_signed(dy as isize))
     };
     let difference =
-        |(x, y): (usize, usize)| reference.image.gray(x, y).abs_diff(reference.image.gray(PIXEL.0, PIXEL.1));
+        |(x, y): (usize, usize)| problem.image.gray(x, y).abs_diff(problem.image.gray(PIXEL.0, PIXEL.1));
     let most_alike = onlooker::OFFSETS.into_iter().map(place).min_by_key(|&at| difference(at)).unwrap();
     let mut neighbors = neighbors(&world, 1.1, false);
     let at = most_alike.1 * neighbors.row_len() + most_alike.0 / 2;
@@ -173,8 +173,8 @@ fn of_equally_cheap_planes_the_one_of_the_neighbor_that_looks_most_alike_is_visi
 fn a_slightly_dearer_plane_is_taken_from_a_validated_neighbor_only_and_at_its_true_cost() {
     const REWARD: f32 = 0.05;
     let (world, window) = (World::five(), window());
-    let reference = world.reference();
-    let mut evaluator = standing(&reference, &window, &options(), false);
+    let problem = world.problem();
+    let mut evaluator = standing(&problem, &window, &options(), false);
     let own = evaluated(&mut evaluator, wall(&world, PIXEL, 1.0));
     let mut cost = |factor| evaluator.cost(&wall(&world, PIXEL, factor), f32::INFINITY);
     let dearer = |cost: f32| (own.cost + 0.01..cost_to_beat(own.cost, REWARD) - 0.01).contains(&cost);
@@ -201,8 +201,8 @@ fn a_slightly_dearer_plane_is_taken_from_a_validated_neighbor_only_and_at_its_tr
 #[test]
 fn neighbors_that_were_never_searched_bring_nothing() {
     let (world, window) = (World::five(), window());
-    let reference = world.reference();
-    let mut evaluator = standing(&reference, &window, &options(), false);
+    let problem = world.problem();
+    let mut evaluator = standing(&problem, &window, &options(), false);
     let own = evaluated(&mut evaluator, wall(&world, PIXEL, 1.3));
     let mut foods = [own];
     let empty = Colonies::new(36, 28, 1);
@@ -226,8 +226,8 @@ fn onlookers_visit_the_other_color_only() {
 #[test]
 fn a_scout_replaces_the_stalest_beyond_the_limit_and_never_the_best() {
     let (world, window) = (World::five(), window());
-    let reference = world.reference();
-    let mut evaluator = standing(&reference, &window, &options(), false);
+    let problem = world.problem();
+    let mut evaluator = standing(&problem, &window, &options(), false);
     let mut random = Random::new(5, 6);
     let food = evaluated(&mut evaluator, wall(&world, PIXEL, 1.1));
     let mut foods = [50, 11, 13, 10, 13].map(|trials| FoodSource { trials, ..food });
@@ -238,7 +238,7 @@ fn a_scout_replaces_the_stalest_beyond_the_limit_and_never_the_best() {
         let changed: Vec<usize> = (0..foods.len()).filter(|&index| foods[index] != before[index]).collect();
         for &index in &changed {
             let food = foods[index];
-            assert!((reference.near..=reference.far).contains(&food.depth));
+            assert!((problem.range.near..=problem.range.far).contains(&food.depth));
             assert_eq!((food.trials, food.validated), (0, false));
             assert_eq!(food.cost, evaluator.cost(&food, f32::INFINITY), "found planes are kept at any cost");
         }
@@ -252,8 +252,8 @@ fn the_best_stands_first_with_its_trials_and_of_equals_the_earlier() {
     let food = |cost, trials| FoodSource { cost, trials, ..FoodSource::new(1.0, Vec3::NEG_Z) };
     let mut foods = [food(0.5, 1), food(0.2, 2), food(0.2, 3)];
     let (world, window) = (World::five(), window());
-    let reference = world.reference();
-    let evaluator = standing(&reference, &window, &options(), false);
+    let problem = world.problem();
+    let evaluator = standing(&problem, &window, &options(), false);
     evaluator.best_first(&mut foods);
     assert_eq!(foods, [food(0.2, 2), food(0.5, 1), food(0.2, 3)]);
     let mut unevaluated = [food(f32::INFINITY, 1), food(f32::INFINITY, 2)];
@@ -266,7 +266,7 @@ fn the_best_stands_first_with_its_trials_and_of_equals_the_earlier() {
 #[test]
 fn a_plane_that_continues_the_validated_neighbors_is_preferred_and_others_pay_up_to_a_limit() {
     let (world, window) = (World::five(), window());
-    let reference = world.reference();
+    let problem = world.problem();
     let smooth = changed(options(), |o| {
         o.cost.smoothness_weight = 0.2;
         o.cost.smoothness_max_depth_error = 0.01;
@@ -276,7 +276,7 @@ fn a_plane_that_continues_the_validated_neighbors_is_preferred_and_others_pay_up
     let food = |cost, factor| FoodSource { cost, ..wall(&world, PIXEL, factor) };
     // The dearer plane stands first exactly if what it saves in smoothness is more.
     let prefers_wall = |validated, factor, extra: f32| {
-        let mut evaluator = standing(&reference, &window, &smooth, false);
+        let mut evaluator = standing(&problem, &window, &smooth, false);
         evaluator.look_around(&neighbors(&world, 1.0, validated), PIXEL);
         let mut foods = [food(0.1, factor), food(0.1 + extra, 1.0)];
         evaluator.best_first(&mut foods);
@@ -299,11 +299,11 @@ fn neighbors_of_another_gray_have_no_say() {
     let grays = (0..width * height).map(|pixel| gray(pixel % width, pixel / width)).collect();
     let picture = crate::image::Picture::from_gray(width as u32, height as u32, grays).unwrap();
     world.images[0] = crate::image::PackedImage::new(&picture);
-    let (reference, window) = (world.reference(), window());
+    let (problem, window) = (world.problem(), window());
     let smooth = changed(options(), |o| {
         o.cost.smoothness_weight = 0.2;
     });
-    let mut evaluator = standing(&reference, &window, &smooth, false);
+    let mut evaluator = standing(&problem, &window, &smooth, false);
     evaluator.look_around(&neighbors(&world, 1.0, true), PIXEL);
     let food = |cost, factor| FoodSource { cost, ..wall(&world, PIXEL, factor) };
     let mut foods = [food(0.1, 1.05), food(0.12, 1.0)];

@@ -8,10 +8,10 @@ use crate::testing::window;
 #[test]
 fn the_wall_costs_less_than_planes_before_and_behind_it() {
     let (world, window) = (World::five(), window());
-    let reference = world.reference();
+    let problem = world.problem();
     for best_views in [0, 3] {
         let mut evaluator = standing(
-            &reference,
+            &problem,
             &window,
             &changed(options(), |o| {
                 o.cost.best_views = best_views;
@@ -30,14 +30,14 @@ fn the_wall_costs_less_than_planes_before_and_behind_it() {
 #[test]
 fn a_cost_is_the_sum_over_all_but_one_or_the_mean_of_the_best() {
     let (world, window) = (World::five(), window());
-    let reference = world.reference();
+    let problem = world.problem();
     let food = wall(&world, PIXEL, 1.1);
     // Pairs of views give the costs of the single ones: (a + b) / 1.
     let cost_of = |views: &[usize], best_views| {
         let options = changed(options(), |o| {
             o.cost.best_views = best_views;
         });
-        let mut evaluator = standing(&reference, &window, &options, false);
+        let mut evaluator = standing(&problem, &window, &options, false);
         let mut set = [0];
         views.iter().for_each(|&view| ViewSets::insert_into(&mut set, view));
         evaluator.go_to(PIXEL.0, PIXEL.1, &set);
@@ -69,10 +69,10 @@ fn a_cost_is_the_sum_over_all_but_one_or_the_mean_of_the_best() {
 #[test]
 fn giving_up_early_changes_no_decision() {
     let (world, window) = (World::five(), window());
-    let reference = world.reference();
+    let problem = world.problem();
     for best_views in [0, 2, 4] {
         let mut evaluator = standing(
-            &reference,
+            &problem,
             &window,
             &changed(options(), |o| {
                 o.cost.best_views = best_views;
@@ -100,8 +100,8 @@ fn a_view_without_the_hypothesis_in_its_image_does_not_count() {
         o.cost.best_views = 8;
     });
     let cost = |world: &World| {
-        let reference = world.reference();
-        let mut evaluator = standing(&reference, &window, &options, false);
+        let problem = world.problem();
+        let mut evaluator = standing(&problem, &window, &options, false);
         evaluator.cost(&wall(world, PIXEL, 1.05), f32::INFINITY)
     };
     world.cameras[3].cx += 100.0;
@@ -120,10 +120,10 @@ fn disagreeing_with_validated_depths_costs_up_to_a_limit() {
         o.cost.geom_consistency_missing_error = 0.015;
     });
     let penalty = |world: &World, factor| {
-        let reference = world.reference();
+        let problem = world.problem();
         let food = wall(world, PIXEL, factor);
         let [with, without] = [true, false]
-            .map(|geometric| standing(&reference, &window, &options, geometric).cost(&food, f32::INFINITY));
+            .map(|geometric| standing(&problem, &window, &options, geometric).cost(&food, f32::INFINITY));
         with - without
     };
     // Nothing is validated yet: half of the limit is assumed, which costs a quarter.
@@ -151,8 +151,8 @@ fn a_pixel_focuses_on_the_views_whose_surfaces_agree_and_without_them_on_those_t
     let (mut world, window) = (World::five(), window());
     let food = wall(&world, PIXEL, 1.0);
     let focused = |world: &World, geometric, food: &FoodSource| {
-        let reference = world.reference();
-        let mut evaluator = standing(&reference, &window, &options(), geometric);
+        let problem = world.problem();
+        let mut evaluator = standing(&problem, &window, &options(), geometric);
         let mut set = [0b1111];
         let cost = evaluator.focus(food, 3, &mut set);
         assert_eq!(set[0].count_ones(), 3);

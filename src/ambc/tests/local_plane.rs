@@ -28,11 +28,10 @@ fn tilted(world: &World, pixel: (usize, usize)) -> FoodSource {
 #[test]
 fn the_depths_around_a_pixel_tell_the_normal() {
     let world = World::five();
-    let reference = world.reference();
+    let problem = world.problem();
     for pixel in [PIXEL, (1, 1), (35, 14), (34, 26)] {
         let exact = wall(&world, pixel, 1.0);
-        let found =
-            fitted(&reference, &depths(&world, pixel, |_, _| 1.0), pixel, &tilted(&world, pixel), 0.05);
+        let found = fitted(&problem, &depths(&world, pixel, |_, _| 1.0), pixel, &tilted(&world, pixel), 0.05);
         let found = found.unwrap_or_else(|| panic!("nothing at {pixel:?}"));
         assert!((found.depth / exact.depth - 1.0).abs() < 1e-5, "{found:?} instead of {exact:?}");
         assert!((found.normal - exact.normal).length() < 1e-4, "{found:?} instead of {exact:?}");
@@ -43,7 +42,7 @@ fn the_depths_around_a_pixel_tell_the_normal() {
 #[test]
 fn neighbors_on_another_surface_have_no_say() {
     let world = World::five();
-    let (reference, exact) = (world.reference(), wall(&world, PIXEL, 1.0));
+    let (problem, exact) = (world.problem(), wall(&world, PIXEL, 1.0));
     // To the right lies another surface, and above there is nothing.
     let behind = |x: usize, y: usize| {
         if y < PIXEL.1 - 3 {
@@ -54,25 +53,25 @@ fn neighbors_on_another_surface_have_no_say() {
             1.0
         }
     };
-    let found = fitted(&reference, &depths(&world, PIXEL, behind), PIXEL, &exact, TOLERANCE).unwrap();
+    let found = fitted(&problem, &depths(&world, PIXEL, behind), PIXEL, &exact, TOLERANCE).unwrap();
     assert!((found.normal - exact.normal).length() < 1e-4, "{found:?} instead of {exact:?}");
 }
 
 #[test]
 fn errors_of_single_depths_average_out() {
     let world = World::five();
-    let (reference, exact) = (world.reference(), wall(&world, PIXEL, 1.0));
+    let (problem, exact) = (world.problem(), wall(&world, PIXEL, 1.0));
     let noisy = |x: usize, y: usize| 1.0 + 2e-3 * ((7 * x + 11 * y) % 5) as f32 - 4e-3;
-    let found = fitted(&reference, &depths(&world, PIXEL, noisy), PIXEL, &exact, TOLERANCE).unwrap();
+    let found = fitted(&problem, &depths(&world, PIXEL, noisy), PIXEL, &exact, TOLERANCE).unwrap();
     assert!((found.depth / exact.depth - 1.0).abs() < 1.5e-3, "{found:?} instead of {exact:?}");
 }
 
 #[test]
 fn a_few_neighbors_or_a_line_of_them_tell_no_plane() {
     let world = World::five();
-    let (reference, exact) = (world.reference(), wall(&world, PIXEL, 1.0));
+    let (problem, exact) = (world.problem(), wall(&world, PIXEL, 1.0));
     let fit = |factor: &dyn Fn(usize, usize) -> f32| {
-        fitted(&reference, &depths(&world, PIXEL, factor), PIXEL, &exact, TOLERANCE)
+        fitted(&problem, &depths(&world, PIXEL, factor), PIXEL, &exact, TOLERANCE)
     };
     let row = |_: usize, y: usize| if y == PIXEL.1 { 1.0 } else { 0.0 };
     assert_eq!(fit(&row), None);

@@ -27,15 +27,14 @@ fn options() -> Options {
 
 /// An evaluator that stands at the pixel with all sources in its set.
 fn standing<'a>(
-    reference: &'a Problem<'a>,
+    problem: &'a Problem<'a>,
     window: &'a Window,
     options: &Options,
     with_geometric_term: bool,
 ) -> Evaluator<'a, Scalar> {
-    let mut evaluator =
-        Evaluator::new(Scalar, reference, window, CostRules::new(options, with_geometric_term));
-    let mut set = vec![0; reference.sources.len().div_ceil(32)];
-    ViewSets::fill_words(&mut set, reference.sources.len());
+    let mut evaluator = Evaluator::new(Scalar, problem, window, CostRules::new(options, with_geometric_term));
+    let mut set = vec![0; problem.sources.len().div_ceil(32)];
+    ViewSets::fill_words(&mut set, problem.sources.len());
     evaluator.go_to(PIXEL.0, PIXEL.1, &set);
     evaluator
 }

@@ -9,19 +9,19 @@ use glam::Vec3;
 #[test]
 fn random_planes_fill_their_stratum_of_inverse_depth_and_face_the_camera() {
     let world = World::five();
-    let reference = world.reference();
-    let ray = reference.ray(3.0, 25.0);
+    let problem = world.problem();
+    let ray = problem.ray(3.0, 25.0);
     let mut random = Random::new(8, 9);
-    let (nearest, farthest) = (1.0 / reference.near, 1.0 / reference.far);
+    let (nearest, farthest) = (1.0 / problem.range.near, 1.0 / problem.range.far);
     let strata = 5;
     for stratum in 0..strata {
         let part = (stratum as f32 / strata as f32, (stratum + 1) as f32 / strata as f32);
         let mut halves = [0; 2];
         for _ in 0..2000 {
-            let food = FoodSource::random(&reference, ray, &mut random, part);
+            let food = FoodSource::random(&problem, ray, &mut random, part);
             let share = (1.0 / food.depth - farthest) / (nearest - farthest);
             assert!((part.0 - 1e-5..=part.1 + 1e-5).contains(&share), "{share} is not in {part:?}");
-            assert!((reference.near..=reference.far).contains(&food.depth));
+            assert!((problem.range.near..=problem.range.far).contains(&food.depth));
             assert!(food.normal.dot(ray) < 0.0 && (food.normal.length() - 1.0).abs() < 1e-5);
             halves[usize::from(share > (part.0 + part.1) / 2.0)] += 1;
         }
@@ -32,18 +32,18 @@ fn random_planes_fill_their_stratum_of_inverse_depth_and_face_the_camera() {
 #[test]
 fn a_plane_transferred_to_another_pixel_is_the_same_plane() {
     let world = World::five();
-    let reference = world.reference();
+    let problem = world.problem();
     let from = wall(&world, PIXEL, 1.0);
-    let ray = |(x, y): (usize, usize)| reference.ray(x as f32, y as f32);
+    let ray = |(x, y): (usize, usize)| problem.ray(x as f32, y as f32);
     for to in [(19, 14), (18, 9), (16, 15), (0, 0), (35, 27)] {
         let offset = (to.0 as f32 - PIXEL.0 as f32, to.1 as f32 - PIXEL.1 as f32);
-        let moved = from.transferred(&reference, ray(PIXEL), ray(to), offset).unwrap();
+        let moved = from.transferred(&problem, ray(PIXEL), ray(to), offset).unwrap();
         assert!((moved.depth / wall(&world, to, 1.0).depth - 1.0).abs() < 1e-5);
         assert_eq!(moved.normal, from.normal);
     }
-    let leaves_the_range = FoodSource::new(reference.near, Vec3::new(0.7, 0.0, -0.7).normalize());
+    let leaves_the_range = FoodSource::new(problem.range.near, Vec3::new(0.7, 0.0, -0.7).normalize());
     let outcomes = [(-5.0, (13, 14)), (5.0, (23, 14))]
-        .map(|(dx, to)| leaves_the_range.transferred(&reference, ray(PIXEL), ray(to), (dx, 0.0)).is_some());
+        .map(|(dx, to)| leaves_the_range.transferred(&problem, ray(PIXEL), ray(to), (dx, 0.0)).is_some());
     assert!(outcomes[0] != outcomes[1], "one way the plane comes nearer than the range");
 }
 
@@ -54,8 +54,8 @@ fn a_validated_plane_shown_by_a_source_is_the_wall_between_its_pixels_too() {
     let validated = vec![(2, true); state.solutions.len()];
     state.mark(&world.cameras[1], &validated);
     world.surfaces[1] = state.surface;
-    let reference = world.reference();
-    let mut projector = SourceProjector::new(Scalar, &reference);
+    let problem = world.problem();
+    let mut projector = SourceProjector::new(Scalar, &problem);
     projector.set_pixel_and_views(0.0, 0.0, &[0b11]);
     let group = &projector.groups()[0];
     let mut at = group.project(Scalar, 5.0);

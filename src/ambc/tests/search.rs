@@ -8,9 +8,9 @@ use crate::testing::{RANGE, window};
 use crate::view_selection::ViewRules;
 
 /// A search without start and iterations.
-fn idle<'a>(reference: &'a Problem<'a>, window: &'a Window) -> Search<'a> {
+fn idle<'a>(problem: &'a Problem<'a>, window: &'a Window) -> Search<'a> {
     Search {
-        reference,
+        problem,
         window,
         cost_rules: CostRules::new(&options(), false),
         view_rules: ViewRules::new(&options(), 2),
@@ -34,8 +34,8 @@ fn idle<'a>(reference: &'a Problem<'a>, window: &'a Window) -> Search<'a> {
 #[test]
 fn the_search_finds_the_wall() {
     let world = World::five();
-    let (reference, window) = (world.reference(), window());
-    let status = Search { foods: 6, iterations: 10, ..idle(&reference, &window) }.run().unwrap();
+    let (problem, window) = (world.problem(), window());
+    let status = Search { foods: 6, iterations: 10, ..idle(&problem, &window) }.run().unwrap();
     let camera = &world.cameras[0];
     let right = status.best.iter().enumerate().filter(|(pixel, food)| {
         let (x, y) = (pixel % 36, pixel / 36);
@@ -52,8 +52,8 @@ fn the_search_finds_the_wall() {
 fn images_of_any_size_are_searched() {
     for size in [(1, 1), (1, 2), (2, 1), (1, 9), (9, 1), (2, 2), (3, 5), (65, 3), (4, 17)] {
         let (world, window) = (World::new(&[0.0, 0.8, -0.8], size), window());
-        let reference = world.reference();
-        let status = Search { foods: 3, iterations: 4, ..idle(&reference, &window) }.run().unwrap();
+        let problem = world.problem();
+        let status = Search { foods: 3, iterations: 4, ..idle(&problem, &window) }.run().unwrap();
         assert_eq!(status.best.len(), (size.0 * size.1) as usize);
         for food in &status.best {
             assert!((RANGE.near as f32..=RANGE.far as f32).contains(&food.depth), "{size:?}: {food:?}");
@@ -64,7 +64,7 @@ fn images_of_any_size_are_searched() {
 #[test]
 fn a_solution_to_start_from_is_kept_unless_beaten_and_an_offer_is_tried() {
     let (world, window) = (World::five(), window());
-    let reference = world.reference();
+    let problem = world.problem();
     let exact = testing::exact(&world.cameras[0]);
     let mut wrong = exact.solutions.clone();
     wrong.iter_mut().for_each(|solution| solution.depth *= 1.5);
@@ -72,7 +72,7 @@ fn a_solution_to_start_from_is_kept_unless_beaten_and_an_offer_is_tried() {
         |solution: &PixelEstimate| Candidate { depth: solution.depth, normal: solution.normal, cost: 0.1 };
     let candidates: Vec<Candidate> = exact.solutions.iter().map(candidate).collect();
     let run = |start: &[PixelEstimate], candidates: Option<&[Candidate]>| {
-        let search = Search { start: Some(start), candidates, ..idle(&reference, &window) };
+        let search = Search { start: Some(start), candidates, ..idle(&problem, &window) };
         search.run().unwrap().best[PIXEL.1 * 36 + PIXEL.0].depth
     };
     let right = exact.solutions[PIXEL.1 * 36 + PIXEL.0].depth;
@@ -84,7 +84,7 @@ fn a_solution_to_start_from_is_kept_unless_beaten_and_an_offer_is_tried() {
 #[test]
 fn a_cancelled_search_ends_in_an_error() {
     let (world, window) = (World::five(), window());
-    let reference = world.reference();
-    let search = Search { cancelled: &|| true, ..idle(&reference, &window) };
+    let problem = world.problem();
+    let search = Search { cancelled: &|| true, ..idle(&problem, &window) };
     assert_eq!(search.run().err(), Some(crate::Error::Cancelled));
 }

@@ -28,8 +28,8 @@ const WORTH_OF_SHARE: f64 = 0.1;
 
 /// Fills the `weak` pixels that have no plane of validated origin, and pixels beside them that look alike; gives those it
 /// filled.
-pub fn fill(reference: &Problem, planes: &mut [FoodSource], weak: &[bool]) -> Vec<usize> {
-    let width = reference.image.width;
+pub fn fill(problem: &Problem, planes: &mut [FoodSource], weak: &[bool]) -> Vec<usize> {
+    let width = problem.image.width;
     let mut marks = Marks::new(planes.len());
     let mut is_traced = vec![false; planes.len()];
     let ends_within = region::end_within(width, weak);
@@ -46,7 +46,7 @@ pub fn fill(reference: &Problem, planes: &mut [FoodSource], weak: &[bool]) -> Ve
             continue;
         }
         if ends_within[pixel] {
-            part.grow(reference, planes, &mut marks);
+            part.grow(problem, planes, &mut marks);
         }
         let witness = |pixel: usize| Witness {
             place: place(pixel, width),
@@ -55,14 +55,14 @@ pub fn fill(reference: &Problem, planes: &mut [FoodSource], weak: &[bool]) -> Ve
         let witnesses: Vec<Witness> =
             part.witnesses(planes, width, &mut marks).into_iter().map(witness).collect();
         let looks = ends_within[pixel]
-            .then(|| Looks::new(reference, &part, part.band(width, planes.len() / width, &mut marks)));
+            .then(|| Looks::new(problem, &part, part.band(width, planes.len() / width, &mut marks)));
         let found = common_planes(&witnesses, parts);
-        let look = |plane| looks.as_ref()?.share(reference, plane);
+        let look = |plane| looks.as_ref()?.share(problem, plane);
         let Some(plane) = choose(&found, part.framed(), look) else {
             continue;
         };
         for &pixel in part.core.iter().chain(&part.grown) {
-            if let Some(found) = on_plane(reference, plane, place(pixel, width)) {
+            if let Some(found) = on_plane(problem, plane, place(pixel, width)) {
                 planes[pixel] = FoodSource { cost: planes[pixel].cost, ..found };
                 filled.push(pixel);
             }
@@ -90,12 +90,12 @@ fn choose(planes: &[RimPlane], framed: f64, looks: impl Fn(DVec3) -> Option<f64>
 }
 
 /// The plane, as inverse depth over column, row and 1, at a pixel, unless it leaves the depth range or turns away there.
-fn on_plane(reference: &Problem, plane: DVec3, place: DVec3) -> Option<FoodSource> {
+fn on_plane(problem: &Problem, plane: DVec3, place: DVec3) -> Option<FoodSource> {
     let about = SlantedPlane {
         inverse_depth: plane.dot(place) as f32,
         slope_x: plane.x as f32,
         slope_y: plane.y as f32,
     };
-    let found = FoodSource::of_plane(reference, reference.ray(place.x as f32, place.y as f32), &about)?;
+    let found = FoodSource::of_plane(problem, problem.ray(place.x as f32, place.y as f32), &about)?;
     Some(FoodSource { validated: true, ..found })
 }

@@ -24,21 +24,21 @@ pub struct Looks {
 }
 
 impl Looks {
-    pub fn new(reference: &Problem, part: &Part, band: Vec<usize>) -> Looks {
-        let look = |pixel: usize| (place(pixel, reference.image.width), blurred(reference.image, pixel, 1));
+    pub fn new(problem: &Problem, part: &Part, band: Vec<usize>) -> Looks {
+        let look = |pixel: usize| (place(pixel, problem.image.width), blurred(problem.image, pixel, 1));
         let every = part.core.len().div_ceil(INNER_PIXELS);
         Looks {
             band: band.into_iter().map(look).collect(),
             inner: part.core.iter().copied().step_by(every).map(look).collect(),
-            tolerance: SAME.0 * deviation(reference.image, part.core[0]) + SAME.1,
+            tolerance: SAME.0 * deviation(problem.image, part.core[0]) + SAME.1,
         }
     }
 
     /// Share of the band that looks the same in the source views if the part lies on this plane: the mean of the better
     /// half of the views, since something may hide it from the others. `None` where too few views see it.
-    pub fn share(&self, reference: &Problem, plane: DVec3) -> Option<f64> {
+    pub fn share(&self, problem: &Problem, plane: DVec3) -> Option<f64> {
         let mut shares: Vec<f64> =
-            reference.sources.iter().filter_map(|source| self.share_in(source, plane)).collect();
+            problem.sources.iter().filter_map(|source| self.share_in(source, plane)).collect();
         if shares.len() < MIN_VIEWS {
             return None;
         }

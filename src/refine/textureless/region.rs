@@ -153,20 +153,20 @@ impl Part {
     }
 
     /// Takes in the pixels around that look alike: their windows reach beyond the outline and match by what is there.
-    pub fn grow(&mut self, reference: &Problem, planes: &[FoodSource], marks: &mut Marks) {
-        let (width, height) = (reference.image.width, reference.image.height);
+    pub fn grow(&mut self, problem: &Problem, planes: &[FoodSource], marks: &mut Marks) {
+        let (width, height) = (problem.image.width, problem.image.height);
         marks.start(&self.core);
         let around = |pixel| neighbors(pixel, width, height).into_iter().flatten();
         let mut front: Vec<(usize, f32)> = (self.core.iter())
             .filter(|&&pixel| around(pixel).any(|other| !marks.has(other)))
-            .map(|&pixel| (pixel, blurred(reference.image, pixel, 2)))
+            .map(|&pixel| (pixel, blurred(problem.image, pixel, 2)))
             .collect();
         for _ in 0..REACH {
             let mut next = Vec::new();
             for (pixel, gray) in front {
                 for other in around(pixel).filter(|&other| planes[other].depth > 0.0) {
-                    let noise = deviation(reference.image, other);
-                    let difference = (blurred(reference.image, other, 1) - gray).abs();
+                    let noise = deviation(problem.image, other);
+                    let difference = (blurred(problem.image, other, 1) - gray).abs();
                     let is_alike = noise > 0.0 && difference < ALIKE.0 * noise + ALIKE.1;
                     if is_alike && marks.add(other) {
                         self.grown.push(other);

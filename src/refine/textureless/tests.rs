@@ -48,7 +48,7 @@ impl Holed {
     /// Fills, and checks that what is not filled is as it was.
     fn fill(&mut self) -> Vec<usize> {
         let before = self.planes.clone();
-        let mut filled = fill(&self.world.reference(), &mut self.planes, &self.weak);
+        let mut filled = fill(&self.world.problem(), &mut self.planes, &self.weak);
         filled.sort_unstable();
         for (pixel, before) in before.iter().enumerate() {
             assert_eq!(self.planes[pixel].cost, before.cost, "filling does not match");
@@ -158,9 +158,9 @@ fn a_pixel_whose_plane_leaves_the_depth_range_stays() {
     let depths = holed.hole().into_iter().map(|pixel| exact(&holed.world, pixel).depth);
     let far = depths.clone().fold(0.0, f32::max) - 0.1;
     let count = depths.filter(|&depth| depth <= far).count();
-    let mut reference = holed.world.reference();
-    reference.far = far;
-    let filled = fill(&reference, &mut holed.planes, &holed.weak);
+    let mut problem = holed.world.problem();
+    problem.range.far = far;
+    let filled = fill(&problem, &mut holed.planes, &holed.weak);
     assert!(filled.len() < holed.hole().len() && filled.len().abs_diff(count) <= 1);
     assert!(filled.iter().all(|&pixel| holed.planes[pixel].depth <= far));
 }
@@ -208,7 +208,7 @@ fn fill_panel(places: &[f64]) -> Vec<FoodSource> {
             _ => FoodSource { validated: true, cost: 0.1, ..exact(&world, pixel) },
         });
     }
-    fill(&world.reference(), &mut planes, &is_weak);
+    fill(&world.problem(), &mut planes, &is_weak);
     planes
 }
 
