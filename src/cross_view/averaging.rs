@@ -1,43 +1,51 @@
-//! Averaging between views, beyond the paper: the same surface is found in every view by itself, with errors of its own.
-//! Each validated plane is averaged with those that the source views found of the same surface.
+//! Averaging across views, beyond the paper: every view finds a surface with errors of its own. Each validated plane is
+//! averaged with those that the source views published of the same surface.
+//!
+//! ```text
+//! 1/d = (1/d_0 + sum w_i / d_i) / (1 + sum w_i)     w_i = (1 - e_i^2)^2 for e_i < 1 (Tukey's biweight), else 0
+//! n   = n_0 + sum w_i n_i, normalized               e_i = (d_0 / d_i - 1) / 0.01
+//! ```
+//!
+//! with `d_i`, `n_i` the plane of source view i transferred to the pixel.
 
-use crate::geometry::MIN_FACING;
+use crate::geometry::PlaneHypothesis;
 use crate::matching::{Problem, SourceProjector};
 use crate::scene::PixelEstimate;
 use crate::simd::{Simd, SimdLevel, Task, dispatch};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Relative difference of inverse depths up to which a source view found the same surface. What it found counts the less
-/// the more it differs, by Tukey's biweight.
-const SAME: f32 = 0.01;
+/// Relative difference of inverse depths from which on a source view's plane is another surface and has no weight.
+const MAX_DIFFERENCE: f32 = 0.01;
 
-/// Averages the validated solutions of a view whose sources show theirs; planes that would leave the depth range or turn
-/// away stay.
-pub fn average(level: SimdLevel, problem: &Problem, solutions: &mut [PixelEstimate]) {
-    dispatch(level, AverageTask { problem, solutions });
+/// Averages the validated planes of a view with the published surfaces of its sources; planes whose average is not usable
+/// stay. Returns the planes; the others are as they were.
+pub fn average(level: SimdLevel, problem: &Problem, planes: &[PixelEstimate]) -> Vec<PixelEstimate> {
+    let mut averaged = planes.to_vec();
+    dispatch(level, AverageTask { problem, planes: &mut averaged });
+    averaged
 }
 
 struct AverageTask<'a> {
     problem: &'a Problem<'a>,
-    solutions: &'a mut [PixelEstimate],
+    planes: &'a mut [PixelEstimate],
 }
 
 impl Task for AverageTask<'_> {
     type Output = ();
 
     fn run<S: Simd>(self, simd: S) {
-        let AverageTask { problem, solutions } = self;
-        let rows = solutions.par_chunks_mut(problem.image.width).enumerate();
+        let AverageTask { problem, planes } = self;
+        let rows = planes.par_chunks_mut(problem.image.width).enumerate();
         rows.for_each(|(y, row)| {
             simd.vectorize(
                 #[inline(always)]
                 || {
                     let mut projector = SourceProjector::with_all_sources(simd, problem);
-                    for (x, solution) in row.iter_mut().enumerate().filter(|(_, own)| own.validated) {
+                    for (x, plane) in row.iter_mut().enumerate().filter(|(_, own)| own.validated) {
                         let (x, y) = (x as f32, y as f32);
                         projector.set_pixel(x, y);
-                        average_pixel(simd, problem, &projector, problem.ray(x, y), solution);
+                        average_pixel(simd, problem, &projector, problem.ray(x, y), plane);
                     }
                 },
             );
@@ -45,30 +53,30 @@ impl Task for AverageTask<'_> {
     }
 }
 
-/// Averages the solution of the pixel at which the sources are projections.
+/// Averages the plane of the projector's pixel.
 #[inline(always)]
 fn average_pixel<S: Simd>(
     simd: S,
     problem: &Problem,
     projector: &SourceProjector<'_, S>,
     ray: Vec3,
-    solution: &mut PixelEstimate,
+    plane: &mut PixelEstimate,
 ) {
-    let own = 1.0 / solution.depth;
+    let own = 1.0 / plane.depth;
     let zero = simd.splat(0.0);
     let (mut weights, mut inverse_depths, mut normals) = (zero, zero, [zero; 3]);
     for group in projector.groups() {
-        let projections = group.project(simd, solution.depth);
+        let projections = group.project(simd, plane.depth);
         let found = group.transfer_planes(simd, &projections);
-        let off = simd.sub(simd.mul(found.inverse_depth, simd.splat(solution.depth)), simd.splat(1.0));
-        let share = simd.mul(off, simd.splat(1.0 / SAME));
-        let left = simd.sub(simd.splat(1.0), simd.mul(share, share));
-        let same = projections.inside & found.known & simd.simd_ge(left, simd.splat(f32::MIN_POSITIVE));
+        let difference = simd.sub(simd.mul(found.inverse_depth, simd.splat(plane.depth)), simd.splat(1.0));
+        let relative = simd.mul(difference, simd.splat(1.0 / MAX_DIFFERENCE));
+        let root = simd.sub(simd.splat(1.0), simd.mul(relative, relative));
+        let same = projections.inside & found.known & simd.simd_ge(root, simd.splat(f32::MIN_POSITIVE));
         if same == 0 {
             continue;
         }
-        // Numbers also in the lanes that count for nothing.
-        let weight = simd.select(same, simd.mul(left, left), zero);
+        // Numbers also in the lanes without weight.
+        let weight = simd.select(same, simd.mul(root, root), zero);
         let inverse_depth = simd.select(same, found.inverse_depth, simd.splat(own));
         weights = simd.add(weights, weight);
         inverse_depths = simd.mul_add(weight, inverse_depth, inverse_depths);
@@ -80,17 +88,15 @@ fn average_pixel<S: Simd>(
     }
     let weights = 1.0 + simd.reduce_sum(weights);
     let depth = weights / (own + simd.reduce_sum(inverse_depths));
-    let [x, y, z] = normals;
-    let normal = solution.normal + Vec3::new(simd.reduce_sum(x), simd.reduce_sum(y), simd.reduce_sum(z));
-    let normal = normal.normalize_or_zero();
-    let is_in_range = depth >= problem.range.near && depth <= problem.range.far;
-    if weights > 1.0 && is_in_range && normal.dot(ray) < -MIN_FACING {
-        *solution = PixelEstimate { depth, normal, ..*solution };
+    let [x, y, z] = normals.map(|axis| simd.reduce_sum(axis));
+    let normal = (plane.normal + Vec3::new(x, y, z)).normalize_or_zero();
+    if weights > 1.0 && (PlaneHypothesis { depth, normal }).is_usable(ray, &problem.range) {
+        *plane = PixelEstimate { depth, normal, ..*plane };
     }
 }
 
-/// Unit normals of planes about the pixel of a ray, as [`SlantedPlane::depth_and_normal`](crate::matching::SlantedPlane::depth_and_normal)
-/// has them.
+/// Unit normals of planes about the pixel of a ray, by the formula of
+/// [`SlantedPlane::depth_and_normal`](crate::geometry::SlantedPlane::depth_and_normal).
 #[inline(always)]
 fn facing_normals<S: Simd>(
     simd: S,
