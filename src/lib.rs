@@ -35,7 +35,7 @@ pub use options::{
     ScheduleOptions, SearchOptions, ViewSelectionOptions, WindowOptions,
 };
 pub use pipeline::{
-    AnyEstimate, Candidates, Checked, Cycle, CycleRecord, OwnMaps, Phase, Progress, ProgressFn,
+    AnyEstimate, Candidates, Checked, Cycle, CycleRecord, EstimateRef, OwnMaps, Phase, Progress, ProgressFn,
     Reconstruction, Searched, Stepper, ViewEstimate, ViewResult, ignore_progress, reconstruct,
 };
 pub use scene::{Maps, PixelStatus, Scene, SparsePoint, View};

@@ -8,7 +8,7 @@ use super::result::skep_result;
 use super::scene::{no_view, skep_scene};
 use super::status::{Failure, guard, skep_status};
 use crate::parallel::JoinedPool;
-use crate::pipeline::{AnyEstimate, Candidates, Checked, Stepper, ViewEstimate};
+use crate::pipeline::{AnyEstimate, Candidates, Checked, EstimateRef, Stepper, ViewEstimate};
 use std::ffi::c_void;
 
 /// A run taken apart, for hosts that schedule views themselves, on one machine or on many, or that bring maps of their
@@ -332,7 +332,9 @@ pub unsafe extern "C" fn skep_stepper_check(
             let value = format!("that of view {} in cycle {}", own.view(), own.cycle());
             return Err(Failure::argument(&name, value, format!("that of view {view} in cycle {cycle}")));
         }
-        let checked = stepper.install(|| stepper.stepper.check(own, &estimates))?;
+        let sources: Vec<Option<EstimateRef>> =
+            estimates.iter().map(|estimate| estimate.map(EstimateRef::from)).collect();
+        let checked = stepper.install(|| stepper.stepper.check(own, &sources))?;
         out.give(skep_estimate::new(AnyEstimate::Checked(checked)));
         Ok(())
     })

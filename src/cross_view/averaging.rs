@@ -119,85 +119,78 @@ fn facing_normals<S: Simd>(
 mod tests {
     use super::*;
     use crate::ambc::Random;
-    use crate::scene::PlaneMap;
     use crate::testing::{self, World};
 
-    /// The world with the wall validated in all views, each depth times a factor of its own; the first view's solutions.
-    fn spoiled(factor: impl Fn(usize, &mut Random) -> f32) -> (World, Vec<PixelEstimate>) {
+    /// The world with the wall validated in all views, each depth times a factor of its own; the first view's planes.
+    fn disturbed(factor: impl Fn(usize, &mut Random) -> f32) -> (World, Vec<PixelEstimate>) {
         let mut world = World::five();
         let mut maps = world.exact();
         for (view, map) in maps.iter_mut().enumerate() {
             let mut random = Random::new(3, view as u64);
-            for solution in &mut map.solutions {
-                *solution = PixelEstimate {
+            for plane in &mut map.planes {
+                *plane = PixelEstimate {
                     validated: true,
-                    depth: solution.depth * factor(view, &mut random),
-                    ..*solution
+                    depth: plane.depth * factor(view, &mut random),
+                    ..*plane
                 };
             }
-            map.show(&world.cameras[view]);
         }
-        world.surfaces = maps.iter_mut().map(|map| std::mem::take(&mut map.surface)).collect();
-        let first: PlaneMap = maps.swap_remove(0);
-        (world, first.solutions)
+        world.surfaces = maps.iter().zip(&world.cameras).map(|(map, camera)| map.publish(camera)).collect();
+        (world, maps.swap_remove(0).planes)
+    }
+
+    fn averaged(problem: &Problem, planes: &[PixelEstimate]) -> Vec<PixelEstimate> {
+        average(SimdLevel::detect(), problem, planes)
     }
 
     /// Root mean square of the relative errors of depth.
-    fn error(world: &World, solutions: &[PixelEstimate]) -> f32 {
-        let off = |(pixel, solution): (usize, &PixelEstimate)| {
-            solution.depth / testing::depth(&world.cameras[0], pixel) - 1.0
+    fn error(world: &World, planes: &[PixelEstimate]) -> f32 {
+        let error = |(pixel, plane): (usize, &PixelEstimate)| {
+            plane.depth / testing::depth(&world.cameras[0], pixel) - 1.0
         };
-        let sum: f32 = solutions.iter().enumerate().map(|each| off(each).powi(2)).sum();
-        (sum / solutions.len() as f32).sqrt()
+        let sum: f32 = planes.iter().enumerate().map(|each| error(each).powi(2)).sum();
+        (sum / planes.len() as f32).sqrt()
     }
 
     #[test]
     fn exact_depths_stay() {
-        let (world, mut solutions) = spoiled(|_, _| 1.0);
-        let before = solutions.clone();
-        average(SimdLevel::detect(), &world.problem(), &mut solutions);
-        for (solution, before) in solutions.iter().zip(&before) {
-            assert!((solution.depth / before.depth - 1.0).abs() < 1e-5, "{solution:?} was {before:?}");
-            assert!((solution.normal - before.normal).length() < 3e-3, "{solution:?} was {before:?}");
-            let PixelEstimate { depth, normal, .. } = *solution;
-            assert_eq!(*solution, PixelEstimate { depth, normal, ..*before });
+        let (world, before) = disturbed(|_, _| 1.0);
+        for (plane, before) in averaged(&world.problem(), &before).iter().zip(&before) {
+            assert!((plane.depth / before.depth - 1.0).abs() < 1e-5, "{plane:?} was {before:?}");
+            assert!((plane.normal - before.normal).length() < 3e-3, "{plane:?} was {before:?}");
+            let PixelEstimate { depth, normal, .. } = *plane;
+            assert_eq!(*plane, PixelEstimate { depth, normal, ..*before });
         }
     }
 
     #[test]
     fn errors_of_five_views_average_out() {
-        let (world, mut solutions) = spoiled(|_, random| 1.0 + 0.002 * random.signed());
-        let before = error(&world, &solutions);
-        average(SimdLevel::detect(), &world.problem(), &mut solutions);
-        let after = error(&world, &solutions);
+        let (world, planes) = disturbed(|_, random| 1.0 + 0.002 * random.signed());
+        let (before, after) = (error(&world, &planes), error(&world, &averaged(&world.problem(), &planes)));
         // One over the square root of five, and what views do not see.
         assert!(after < 0.55 * before, "{before} to {after}");
     }
 
     #[test]
-    fn another_surface_says_nothing_and_what_is_not_validated_stays() {
-        let (world, mut solutions) = spoiled(|view, _| if view > 0 { 1.03 } else { 1.001 });
-        solutions[100].validated = false;
-        let before = solutions.clone();
-        average(SimdLevel::detect(), &world.problem(), &mut solutions);
-        assert_eq!(solutions, before);
-        let (nearer, mut solutions) = spoiled(|view, _| if view > 0 { 1.003 } else { 1.0 });
-        solutions[100].validated = false;
-        let before = solutions.clone();
-        average(SimdLevel::detect(), &nearer.problem(), &mut solutions);
-        assert_eq!(solutions[100], before[100]);
-        assert!(solutions[101].depth > 1.001 * before[101].depth);
+    fn another_surface_has_no_weight_and_planes_that_are_not_validated_stay() {
+        let (world, mut planes) = disturbed(|view, _| if view > 0 { 1.03 } else { 1.001 });
+        planes[100].validated = false;
+        assert_eq!(averaged(&world.problem(), &planes), planes);
+        let (nearer, mut planes) = disturbed(|view, _| if view > 0 { 1.003 } else { 1.0 });
+        planes[100].validated = false;
+        let after = averaged(&nearer.problem(), &planes);
+        assert_eq!(after[100], planes[100]);
+        assert!(after[101].depth > 1.001 * planes[101].depth);
     }
 
     #[test]
     fn depths_stay_in_the_range() {
-        let (world, mut solutions) = spoiled(|view, _| if view > 0 { 1.004 } else { 1.0 });
-        let before = solutions.clone();
+        let (world, before) = disturbed(|view, _| if view > 0 { 1.004 } else { 1.0 });
         let mut problem = world.problem();
-        problem.range.far = before.iter().map(|solution| solution.depth).fold(0.0, f32::max);
-        average(SimdLevel::detect(), &problem, &mut solutions);
-        assert!(solutions.iter().all(|solution| solution.depth <= problem.range.far));
-        assert!(solutions.iter().zip(&before).any(|(solution, before)| solution == before));
-        assert!(solutions.iter().zip(&before).any(|(solution, before)| solution != before));
+        problem.range.far = before.iter().map(|plane| plane.depth).fold(0.0, f32::max);
+        let after = averaged(&problem, &before);
+        assert!(after.iter().all(|plane| plane.depth <= problem.range.far));
+        assert!(after.iter().zip(&before).any(|(after, before)| after == before));
+        assert!(after.iter().zip(&before).any(|(after, before)| after != before));
     }
 }

@@ -201,33 +201,41 @@ impl ConsistencyCheck<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::PlaneMap;
     use crate::simd::Scalar;
-    use crate::testing::{World, changed};
+    use crate::testing::World;
 
-    fn abstaining(occluders_abstain: bool) -> Options {
-        changed(Options::default(), |o| {
-            o.check.depth_tolerance = 0.01;
-            o.check.normal_tolerance = 30.0;
-            o.check.min_consistent_fraction = 0.7;
-            o.check.min_consistent_views = 2;
-            o.check.ignore_occluders = occluders_abstain;
-        })
+    /// The pixel in the middle of the first view.
+    const MIDDLE: usize = 14 * 36 + 18;
+
+    fn options(ignore_occluders: bool) -> CheckOptions {
+        CheckOptions {
+            depth_tolerance: 0.01,
+            normal_tolerance: 30.0,
+            min_consistent_views: 2,
+            min_consistent_fraction: 0.7,
+            ignore_occluders,
+        }
     }
 
-    /// How a source view's own depth and the angle between normals compare with a solution at a depth of `scale`.
-    fn compare(rules: &ConsistencyRules, scale: f32, factor: f32, degrees: f32) -> (Depths, bool) {
+    fn rules(ignore_occluders: bool) -> ConsistencyRules {
+        ConsistencyRules::new(&options(ignore_occluders))
+    }
+
+    /// Compares a plane at depth `scale` with a source view's own depth of `factor` times that and a normal `degrees` away.
+    fn compare(rules: &ConsistencyRules, scale: f32, factor: f32, degrees: f32) -> (DepthComparison, bool) {
         let own = Vec3::new(degrees.to_radians().sin(), 0.0, -degrees.to_radians().cos());
         let depths = rules.compare(Scalar, [scale; LANES], [scale * factor; LANES]);
-        (depths, rules.agree(Vec3::NEG_Z, own))
+        (depths, rules.is_same_normal(Vec3::NEG_Z, own))
     }
 
-    const SAME: Depths = Depths { same: 0xff, abstaining: 0 };
-    const OTHER: Depths = Depths { same: 0, abstaining: 0 };
-    const ABSTAINING: Depths = Depths { same: 0, abstaining: 0xff };
+    const SAME: DepthComparison = DepthComparison { same: 0xff, ignored: 0 };
+    const OTHER: DepthComparison = DepthComparison { same: 0, ignored: 0 };
+    const IGNORED: DepthComparison = DepthComparison { same: 0, ignored: 0xff };
 
     #[test]
-    fn a_source_agrees_within_both_tolerances() {
-        for rules in [true, false].map(|abstain| ConsistencyRules::new(&abstaining(abstain))) {
+    fn planes_are_consistent_within_both_tolerances() {
+        for rules in [true, false].map(rules) {
             for scale in [4.0, 4000.0] {
                 let compare = |factor, degrees| compare(&rules, scale, factor, degrees);
                 assert_eq!(compare(1.0, 0.0), (SAME, true));
@@ -236,38 +244,36 @@ mod tests {
                 assert_eq!(compare(1.011, 0.0), (OTHER, true));
                 assert_eq!(compare(1.0, 31.0), (SAME, false));
                 assert_eq!(compare(1.0, -31.0), (SAME, false));
-                // A source without a solution speaks against.
+                // A source view without a depth counts as another depth.
                 assert_eq!(compare(0.0, 0.0), (OTHER, true));
             }
         }
     }
 
     #[test]
-    fn closer_rules_halve_the_tolerance_of_depths() {
-        let closer = ConsistencyRules::new(&abstaining(false)).closer();
-        assert_eq!(compare(&closer, 4.0, 1.0049, 29.0), (SAME, true));
-        assert_eq!(compare(&closer, 4.0, 1.0051, 0.0), (OTHER, true));
-        assert_eq!(compare(&closer, 4.0, 1.0, 31.0), (SAME, false));
+    fn a_recheck_halves_the_depth_tolerance() {
+        let recheck = rules(false).for_recheck();
+        assert_eq!(compare(&recheck, 4.0, 1.0049, 29.0), (SAME, true));
+        assert_eq!(compare(&recheck, 4.0, 1.0051, 0.0), (OTHER, true));
+        assert_eq!(compare(&recheck, 4.0, 1.0, 31.0), (SAME, false));
     }
 
     #[test]
-    fn what_lies_in_front_abstains_or_speaks_against_as_in_the_paper() {
-        for (abstain, in_front) in [(true, ABSTAINING), (false, OTHER)] {
-            let rules = ConsistencyRules::new(&abstaining(abstain));
+    fn a_depth_in_front_is_ignored_or_counts_against_the_plane_as_in_the_paper() {
+        for (ignore_occluders, in_front) in [(true, IGNORED), (false, OTHER)] {
+            let rules = rules(ignore_occluders);
             assert_eq!(compare(&rules, 4.0, 0.985, 0.0).0, in_front);
             assert_eq!(compare(&rules, 4.0, 0.25, 80.0).0, in_front);
-            // What lies behind never abstains.
+            // A depth behind is never ignored.
             assert_eq!(compare(&rules, 4.0, 1.25, 0.0).0, OTHER);
         }
     }
 
     #[test]
-    fn enough_sources_and_a_share_of_them_must_agree() {
-        let rules = |min_consistent, consistent_share| {
-            ConsistencyRules::new(&changed(Options::default(), |o| {
-                o.check.min_consistent_views = min_consistent;
-                o.check.min_consistent_fraction = consistent_share;
-            }))
+    fn a_number_and_a_fraction_of_the_views_must_be_consistent() {
+        let rules = |min_consistent_views, min_consistent_fraction| {
+            let options = CheckOptions { min_consistent_views, min_consistent_fraction, ..options(true) };
+            ConsistencyRules::new(&options)
         };
         let seventy = rules(2, 0.7);
         assert!(!seventy.validates(0, 0));
@@ -280,70 +286,81 @@ mod tests {
         assert!(rules(3, 0.0).validates(3, 100) && !rules(3, 0.0).validates(2, 2));
     }
 
-    /// The verdicts on the exact wall when the depths of the first sources are multiplied by these factors, at the pixel
-    /// in the middle.
-    fn checked(factors: &[f32], occluders_abstain: bool) -> (u8, bool) {
+    /// The verdicts on the first view's planes against those of the other views.
+    fn verdicts(
+        world: &World,
+        maps: &[PlaneMap],
+        view_sets: &ViewSets,
+        ignore_occluders: bool,
+    ) -> Vec<Verdict> {
+        let check = ConsistencyCheck {
+            problem: &world.problem(),
+            planes: &maps[0].planes,
+            view_sets,
+            sources: maps[1..].iter().map(|map| &map.planes[..]).collect(),
+            rules: rules(ignore_occluders),
+            level: SimdLevel::detect(),
+            advance: &|_| Ok(()),
+        };
+        check.run().unwrap()
+    }
+
+    /// The verdict on the exact wall in the middle when the depths of the first sources are multiplied by these factors.
+    fn verdict_with(factors: &[f32], ignore_occluders: bool) -> Verdict {
         let world = World::five();
         let mut maps = world.exact();
         for (map, factor) in maps[1..].iter_mut().zip(factors) {
-            map.solutions.iter_mut().for_each(|solution| solution.depth *= factor);
+            map.planes.iter_mut().for_each(|plane| plane.depth *= factor);
         }
-        let sources: Vec<Option<&PlaneMap>> = maps[1..].iter().map(Some).collect();
-        let rules = ConsistencyRules::new(&abstaining(occluders_abstain));
-        let verdicts =
-            check(SimdLevel::detect(), &world.problem(), &maps[0], &sources, &rules, &|| false).unwrap();
-        assert_eq!(verdicts.len(), maps[0].solutions.len());
-        verdicts[14 * 36 + 18]
+        verdicts(&world, &maps, &world.all_views(), ignore_occluders)[MIDDLE]
     }
 
     #[test]
-    fn the_sources_of_a_pixel_s_set_are_asked() {
-        assert_eq!(checked(&[], true), (4, true));
-        assert_eq!(checked(&[1.05], true), (3, true));
-        assert_eq!(checked(&[1.05, 1.05], true), (2, false));
-        // Two occluders do not count, unless they vote.
-        assert_eq!(checked(&[0.9, 0.9], true), (2, true));
-        assert_eq!(checked(&[0.9, 0.9], false), (2, false));
-        assert_eq!(checked(&[0.9, 0.9, 0.9], true), (1, false));
+    fn the_views_of_a_pixel_s_set_are_counted() {
+        assert_eq!(verdict_with(&[], true), (4, true));
+        assert_eq!(verdict_with(&[1.05], true), (3, true));
+        assert_eq!(verdict_with(&[1.05, 1.05], true), (2, false));
+        // Two occluders are ignored, unless they count.
+        assert_eq!(verdict_with(&[0.9, 0.9], true), (2, true));
+        assert_eq!(verdict_with(&[0.9, 0.9], false), (2, false));
+        assert_eq!(verdict_with(&[0.9, 0.9, 0.9], true), (1, false));
     }
 
     #[test]
-    fn sources_outside_the_set_and_outside_their_image_are_not_asked() {
+    fn views_outside_the_set_and_views_whose_image_the_point_leaves_do_not_count() {
         let world = World::five();
-        let mut maps = world.exact();
-        let pixels = maps[0].solutions.len();
+        let maps = world.exact();
+        let pixels = maps[0].planes.len();
         let [mut two, mut one] = [ViewSets::empty(pixels, 4), ViewSets::empty(pixels, 4)];
         for pixel in 0..pixels {
             two.insert(pixel, 0);
             two.insert(pixel, 3);
             one.insert(pixel, 2);
         }
-        let rules = ConsistencyRules::new(&abstaining(true));
-        let mut verdicts = |sets: ViewSets| {
-            maps[0].sets = sets;
-            let sources: Vec<Option<&PlaneMap>> = maps[1..].iter().map(Some).collect();
-            check(SimdLevel::detect(), &world.problem(), &maps[0], &sources, &rules, &|| false).unwrap()
-        };
-        let middle = 14 * 36 + 18;
-        assert_eq!(verdicts(one)[middle], (1, false));
-        let verdicts = verdicts(two);
-        assert_eq!(verdicts[middle], (2, true));
+        assert_eq!(verdicts(&world, &maps, &one, true)[MIDDLE], (1, false));
+        let verdicts = verdicts(&world, &maps, &two, true);
+        assert_eq!(verdicts[MIDDLE], (2, true));
         let outside = verdicts.iter().filter(|verdict| verdict.0 < 2).count();
-        assert!(outside > 0 && outside < pixels / 2, "{outside} of {pixels} are seen by one of the two only");
+        assert!(
+            outside > 0 && outside < pixels / 2,
+            "{outside} of {pixels} are visible in one of the two only"
+        );
         assert!(verdicts.iter().all(|&(count, validated)| validated == (count == 2)));
     }
 
     #[test]
-    fn a_pixel_without_a_solution_is_not_validated() {
+    fn a_source_view_without_planes_does_not_count() {
         let world = World::five();
         let mut maps = world.exact();
-        maps[0].solutions[14 * 36 + 18].depth = 0.0;
-        let sources: Vec<Option<&PlaneMap>> = maps[1..].iter().map(Some).collect();
-        let rules = ConsistencyRules::new(&abstaining(true));
-        assert_eq!(
-            check(SimdLevel::detect(), &world.problem(), &maps[0], &sources, &rules, &|| false).unwrap()
-                [14 * 36 + 18],
-            (0, false)
-        );
+        maps[1].planes = Vec::new();
+        assert_eq!(verdicts(&world, &maps, &world.all_views(), true)[MIDDLE], (3, true));
+    }
+
+    #[test]
+    fn a_pixel_without_a_plane_is_not_validated() {
+        let world = World::five();
+        let mut maps = world.exact();
+        maps[0].planes[MIDDLE].depth = 0.0;
+        assert_eq!(verdicts(&world, &maps, &world.all_views(), true)[MIDDLE], (0, false));
     }
 }

@@ -135,25 +135,35 @@ fn depth_at(target: &Target, pixel: usize, point: DVec3, normal: DVec3) -> Optio
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::PixelEstimate;
-    use crate::scene::plane_map::ShortCost;
+    use crate::scene::PlaneMap;
     use crate::testing::{self, RANGE, World};
 
-    /// A world, its target's map, and the exact maps of the others.
-    fn target_and_givers() -> (World, PlaneMap, Vec<PlaneMap>) {
+    /// A world, its target's planes, and the exact planes of the other views.
+    fn target_and_donors() -> (World, PlaneMap, Vec<PlaneMap>) {
         let world = World::five();
         let mut maps = world.exact();
         let target = maps.remove(0);
         (world, target, maps)
     }
 
-    /// What views of these indices candidate to view 0.
-    fn offered(world: &World, target: &PlaneMap, donors: &[(usize, &PlaneMap)]) -> Vec<Candidate> {
-        let donors: Vec<Donor> =
-            donors.iter().map(|&(view, map)| Donor { view, camera: &world.cameras[view], map }).collect();
-        let candidates = candidates(&world.cameras[0], target, RANGE, &donors, &|| false).unwrap();
-        assert_eq!(candidates.len(), target.solutions.len());
-        candidates
+    /// The candidates of view 0 from views of these indices.
+    fn propagated(world: &World, target: &PlaneMap, donors: &[(usize, &PlaneMap)]) -> Vec<Candidate> {
+        within(RANGE, world, target, donors)
+    }
+
+    fn within(
+        range: DepthRange,
+        world: &World,
+        target: &PlaneMap,
+        donors: &[(usize, &PlaneMap)],
+    ) -> Vec<Candidate> {
+        let donors: Vec<Donor> = (donors.iter())
+            .map(|&(view, map)| Donor { view, camera: &world.cameras[view], planes: &map.planes })
+            .collect();
+        let target = Target { camera: &world.cameras[0], planes: &target.planes, range };
+        let found = candidates(&target, &donors, &|_| Ok(())).unwrap();
+        assert_eq!(found.len(), target.planes.len());
+        found
     }
 
     fn count(candidates: &[Candidate]) -> usize {
@@ -161,95 +171,97 @@ mod tests {
     }
 
     #[test]
-    fn an_offer_lands_where_its_point_projects_with_its_plane_s_depth_there() {
-        let (world, target, donors) = target_and_givers();
-        let candidates = offered(&world, &target, &[(1, &donors[0])]);
+    fn a_candidate_has_its_plane_s_depth_at_the_pixel_its_point_projects_to() {
+        let (world, target, donors) = target_and_donors();
+        let found = propagated(&world, &target, &[(1, &donors[0])]);
         let camera = &world.cameras[0];
-        assert!(count(&candidates) > camera.pixels() / 2);
-        for (pixel, candidate) in candidates.iter().enumerate().filter(|(_, candidate)| candidate.depth > 0.0)
-        {
-            // Points land beside the pixel's center, and the wall is slanted: only its plane is exact.
+        assert!(count(&found) > camera.pixels() / 2);
+        for (pixel, candidate) in found.iter().enumerate().filter(|(_, candidate)| candidate.depth > 0.0) {
+            // Points project beside the pixel's center, and the wall is slanted: only its plane is exact.
             assert!((candidate.depth / testing::depth(camera, pixel) - 1.0).abs() < 1e-5);
             assert!(candidate.normal.distance(testing::normal(camera)) < 1e-5);
-            assert_eq!(candidate.cost, f32::from(ShortCost::from(0.1)));
+            assert_eq!(
+                candidate.cost,
+                f32::from(PixelEstimate { cost: 0.1.into(), ..Default::default() }.cost)
+            );
         }
     }
 
     #[test]
-    fn a_single_solution_lands_at_a_single_pixel() {
-        let (world, target, mut donors) = target_and_givers();
+    fn a_single_plane_becomes_a_candidate_of_a_single_pixel() {
+        let (world, target, mut donors) = target_and_donors();
         let source = 10 * 36 + 20;
-        for (pixel, solution) in donors[0].solutions.iter_mut().enumerate() {
-            solution.consistent = u8::from(pixel == source);
+        for (pixel, plane) in donors[0].planes.iter_mut().enumerate() {
+            plane.consistent_views = u8::from(pixel == source);
         }
-        let candidates = offered(&world, &target, &[(1, &donors[0])]);
+        let found = propagated(&world, &target, &[(1, &donors[0])]);
         let camera = &world.cameras[1];
-        let depth = f64::from(donors[0].solutions[source].depth);
+        let depth = f64::from(donors[0].planes[source].depth);
         let point = camera.unproject(testing::place(camera, source), depth);
         let (x, y) = world.cameras[0].nearest_pixel(world.cameras[0].project(point).unwrap().0).unwrap();
-        assert_eq!(count(&candidates), 1);
-        assert!(candidates[(y * 36 + x) as usize].depth > 0.0);
+        assert_eq!(count(&found), 1);
+        assert!(found[(y * 36 + x) as usize].depth > 0.0);
     }
 
     #[test]
-    fn validated_pixels_get_no_offer() {
-        let (world, mut target, donors) = target_and_givers();
-        for solution in &mut target.solutions[..500] {
-            solution.validated = true;
+    fn validated_pixels_get_no_candidate() {
+        let (world, mut target, donors) = target_and_donors();
+        for plane in &mut target.planes[..500] {
+            plane.validated = true;
         }
-        let candidates = offered(&world, &target, &[(1, &donors[0]), (2, &donors[1])]);
-        assert_eq!(count(&candidates[..500]), 0);
-        assert!(count(&candidates[500..]) > 250);
+        let found = propagated(&world, &target, &[(1, &donors[0]), (2, &donors[1])]);
+        assert_eq!(count(&found[..500]), 0);
+        assert!(count(&found[500..]) > 250);
     }
 
     #[test]
-    fn only_what_a_source_confirmed_is_offered() {
-        let (world, target, mut donors) = target_and_givers();
-        donors[0].solutions.iter_mut().for_each(|solution| solution.consistent = 0);
-        assert_eq!(count(&offered(&world, &target, &[(1, &donors[0])])), 0);
-        donors[0].solutions.iter_mut().for_each(|solution| {
-            *solution = PixelEstimate { consistent: 1, depth: 0.0, ..*solution };
+    fn only_planes_that_a_source_view_confirmed_are_propagated() {
+        let (world, target, mut donors) = target_and_donors();
+        donors[0].planes.iter_mut().for_each(|plane| plane.consistent_views = 0);
+        assert_eq!(count(&propagated(&world, &target, &[(1, &donors[0])])), 0);
+        donors[0].planes.iter_mut().for_each(|plane| {
+            *plane = PixelEstimate { consistent_views: 1, depth: 0.0, ..*plane };
         });
-        assert_eq!(count(&offered(&world, &target, &[(1, &donors[0])])), 0);
+        assert_eq!(count(&propagated(&world, &target, &[(1, &donors[0])])), 0);
     }
 
     #[test]
-    fn the_cheapest_offer_is_taken_and_of_equals_that_of_the_lowest_view_in_any_order() {
-        let (mut world, target, mut donors) = target_and_givers();
-        // Views at the same place candidate the same points: their normals tell who was taken.
+    fn the_candidate_of_lowest_cost_is_kept_and_of_equals_that_of_the_lowest_view_in_any_order() {
+        let (mut world, target, mut donors) = target_and_donors();
+        // Views at the same position propagate the same points: their normals tell which one was kept.
         (world.cameras[2], world.cameras[3]) = (world.cameras[1], world.cameras[1]);
-        let tilt = |map: &PlaneMap, x: f32, cost: f32| {
+        let tilted = |map: &PlaneMap, x: f32, cost: f32| {
             let mut map = map.clone();
-            map.solutions.iter_mut().for_each(|s| {
-                *s = PixelEstimate { normal: (s.normal + x * Vec3::X).normalize(), cost: cost.into(), ..*s };
+            map.planes.iter_mut().for_each(|plane| {
+                let normal = (plane.normal + x * Vec3::X).normalize();
+                *plane = PixelEstimate { normal, cost: cost.into(), ..*plane };
             });
             map
         };
-        donors[1] = tilt(&donors[0], 0.1, 0.1);
-        donors[2] = tilt(&donors[0], 0.2, 0.05);
+        donors[1] = tilted(&donors[0], 0.1, 0.1);
+        donors[2] = tilted(&donors[0], 0.2, 0.05);
         let (one, two, three) = ((1, &donors[0]), (2, &donors[1]), (3, &donors[2]));
-        let only = |donor| offered(&world, &target, &[donor]);
+        let only = |donor| propagated(&world, &target, &[donor]);
         assert_ne!(only(one), only(two));
-        assert_eq!(offered(&world, &target, &[one, two]), only(one));
-        assert_eq!(offered(&world, &target, &[two, one]), only(one));
+        assert_eq!(propagated(&world, &target, &[one, two]), only(one));
+        assert_eq!(propagated(&world, &target, &[two, one]), only(one));
         for order in [[one, two, three], [three, one, two], [two, three, one]] {
-            assert_eq!(offered(&world, &target, &order), only(three));
+            assert_eq!(propagated(&world, &target, &order), only(three));
         }
     }
 
     #[test]
-    fn without_givers_nothing_is_offered() {
-        let (world, target, _) = target_and_givers();
-        assert_eq!(offered(&world, &target, &[]), vec![Candidate::default(); target.solutions.len()]);
+    fn without_donors_there_are_no_candidates() {
+        let (world, target, _) = target_and_donors();
+        assert_eq!(propagated(&world, &target, &[]), vec![Candidate::default(); target.planes.len()]);
     }
 
     #[test]
-    fn a_plane_beyond_the_target_s_range_or_turned_away_is_not_offered() {
-        let (world, target, mut donors) = target_and_givers();
+    fn a_plane_out_of_the_target_s_range_or_turned_away_is_not_propagated() {
+        let (world, target, mut donors) = target_and_donors();
         let short = DepthRange { near: 1.0, far: 3.0 };
-        let donor = Donor { view: 1, camera: &world.cameras[1], map: &donors[0] };
-        assert_eq!(count(&candidates(&world.cameras[0], &target, short, &[donor], &|| false).unwrap()), 0);
-        donors[0].solutions.iter_mut().for_each(|solution| solution.normal = -solution.normal);
-        assert_eq!(count(&offered(&world, &target, &[(1, &donors[0])])), 0);
+        assert_eq!(count(&within(short, &world, &target, &[(1, &donors[0])])), 0);
+        donors[0].planes.iter_mut().for_each(|plane| plane.normal = -plane.normal);
+        assert_eq!(count(&propagated(&world, &target, &[(1, &donors[0])])), 0);
     }
 }

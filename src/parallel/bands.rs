@@ -32,12 +32,6 @@ impl Bands {
     pub fn pixels(self) -> usize {
         self.width * self.rows
     }
-
-    /// Row and column of a pixel of a band, counted from 0 within it.
-    #[inline(always)]
-    pub fn row_and_column(self, pixel: usize) -> (usize, usize) {
-        (pixel / self.width, pixel % self.width)
-    }
 }
 
 /// Does `work` for each band on the threads of the current rayon pool, compiled for the instruction set, and returns the

@@ -52,6 +52,15 @@ pub enum AnyEstimate {
     Checked(ViewEstimate<Checked>),
 }
 
+/// A reference to an estimate after either stage.
+#[derive(Debug, Clone, Copy)]
+pub enum EstimateRef<'a> {
+    /// After a search.
+    Searched(&'a ViewEstimate<Searched>),
+    /// After a check.
+    Checked(&'a ViewEstimate<Checked>),
+}
+
 /// The maps of a view that the host brings, to start from or to check others against.
 #[derive(Debug, Clone, Copy)]
 pub struct OwnMaps<'a> {
@@ -224,8 +233,35 @@ impl AnyEstimate {
         }
     }
 
-    pub(super) fn planes(&self) -> &[PixelEstimate] {
+    fn planes(&self) -> &[PixelEstimate] {
         either!(self, estimate => estimate.planes())
+    }
+}
+
+impl<'a> EstimateRef<'a> {
+    pub(super) fn planes(self) -> &'a [PixelEstimate] {
+        match self {
+            EstimateRef::Searched(estimate) => estimate.planes(),
+            EstimateRef::Checked(estimate) => estimate.planes(),
+        }
+    }
+}
+
+impl<'a> From<&'a ViewEstimate<Searched>> for EstimateRef<'a> {
+    fn from(estimate: &'a ViewEstimate<Searched>) -> Self {
+        EstimateRef::Searched(estimate)
+    }
+}
+
+impl<'a> From<&'a ViewEstimate<Checked>> for EstimateRef<'a> {
+    fn from(estimate: &'a ViewEstimate<Checked>) -> Self {
+        EstimateRef::Checked(estimate)
+    }
+}
+
+impl<'a> From<&'a AnyEstimate> for EstimateRef<'a> {
+    fn from(estimate: &'a AnyEstimate) -> Self {
+        either!(estimate, estimate => estimate.into())
     }
 }
 

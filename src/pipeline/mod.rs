@@ -21,7 +21,7 @@ use crate::parallel::JoinedPool;
 use crate::scene::Scene;
 use context::{Place, RunContext};
 pub use cycle::Cycle;
-pub use estimate::{AnyEstimate, Checked, OwnMaps, Searched, ViewEstimate};
+pub use estimate::{AnyEstimate, Checked, EstimateRef, OwnMaps, Searched, ViewEstimate};
 use progress::Tracker;
 pub use progress::{Phase, Progress, ProgressFn, ignore_progress};
 pub use result::{CycleRecord, Reconstruction, ViewResult};

@@ -46,9 +46,8 @@ mod tests {
     #[test]
     fn every_pixel_has_the_reason_that_comes_first() {
         let world = World::five();
-        let mut estimates = world.exact();
-        let estimate = &mut maps[0];
-        let pixels = estimate.planes.len();
+        let map = &mut world.exact()[0];
+        let pixels = map.planes.len();
         let mut mask = vec![true; pixels];
         let mut confidence = Confidence {
             cost: vec![0.0; pixels],
@@ -60,20 +59,20 @@ mod tests {
         let mut expected = vec![PixelStatus::Inconsistent; pixels];
 
         (mask[0], expected[0]) = (false, PixelStatus::Masked);
-        estimate.planes[0].depth = 0.0;
-        (estimate.planes[1].validated, expected[1]) = (true, PixelStatus::Validated);
+        map.planes[0].depth = 0.0;
+        (map.planes[1].validated, expected[1]) = (true, PixelStatus::Validated);
         (confidence.has_texture[2], expected[2]) = (false, PixelStatus::NoTexture);
-        (estimate.planes[3].depth, expected[3]) = (RANGE.near as f32, PixelStatus::OutOfRange);
-        (estimate.planes[4].depth, expected[4]) = (RANGE.far as f32, PixelStatus::OutOfRange);
-        (estimate.planes[5].depth, expected[5]) = (RANGE.far as f32 * 0.99, PixelStatus::Inconsistent);
-        (estimate.planes[6].depth, expected[6]) = (0.0, PixelStatus::NoSources);
+        (map.planes[3].depth, expected[3]) = (RANGE.near as f32, PixelStatus::OutOfRange);
+        (map.planes[4].depth, expected[4]) = (RANGE.far as f32, PixelStatus::OutOfRange);
+        (map.planes[5].depth, expected[5]) = (RANGE.far as f32 * 0.99, PixelStatus::Inconsistent);
+        (map.planes[6].depth, expected[6]) = (0.0, PixelStatus::NoSources);
         let mut sets = ViewSets::empty(pixels, 4);
         for pixel in 0..pixels {
             (0..if pixel == 7 { 1 } else { 2 }).for_each(|source| sets.insert(pixel, source));
         }
         (confidence.view_sets, expected[7]) = (sets, PixelStatus::NoSources);
         // Validated is validated, whatever else.
-        (estimate.planes[8].validated, expected[8]) = (true, PixelStatus::Validated);
+        (map.planes[8].validated, expected[8]) = (true, PixelStatus::Validated);
         confidence.has_texture[8] = false;
 
         let view = ScaledView {
@@ -82,10 +81,10 @@ mod tests {
             mask: Some(mask),
             range: RANGE,
         };
-        assert_eq!(classify(&view, &estimate.planes, &confidence, 2), expected);
+        assert_eq!(classify(&view, &map.planes, &confidence, 2), expected);
         // With a single source no pixel can be validated: that is the reason.
-        estimate.planes.iter_mut().for_each(|plane| plane.validated = false);
-        let alone = classify(&view, &estimate.planes, &Confidence { sources: 1, ..confidence }, 2);
+        map.planes.iter_mut().for_each(|plane| plane.validated = false);
+        let alone = classify(&view, &map.planes, &Confidence { sources: 1, ..confidence }, 2);
         assert!(alone[0] == PixelStatus::Masked && alone[1..].iter().all(|&o| o == PixelStatus::NoSources));
     }
 }

@@ -2,7 +2,7 @@
 
 use super::context::{Place, RunContext};
 use super::cycle::Cycle;
-use super::estimate::{AnyEstimate, Checked, Searched, ViewEstimate};
+use super::estimate::{Checked, EstimateRef, Searched, ViewEstimate};
 use super::progress::{Phase, ProgressFn, Tracker};
 use super::result::ViewResult;
 use super::stages::{self, Candidates, SearchInput};
@@ -152,7 +152,7 @@ impl Stepper {
     pub fn check(
         &self,
         own: &ViewEstimate<Searched>,
-        sources: &[Option<&AnyEstimate>],
+        sources: &[Option<EstimateRef>],
     ) -> Result<ViewEstimate<Checked>> {
         self.0.check_place(own.at)?;
         self.check_size(own.cycle(), own, "own")?;
@@ -160,12 +160,12 @@ impl Stepper {
         for (view, source) in sources.iter().enumerate() {
             let name = format!("estimates[{view}]");
             match source {
-                Some(AnyEstimate::Searched(found)) => self.check_estimate(own.cycle(), view, found, &name)?,
-                Some(AnyEstimate::Checked(found)) => self.check_estimate(own.cycle(), view, found, &name)?,
+                Some(EstimateRef::Searched(found)) => self.check_estimate(own.cycle(), view, found, &name)?,
+                Some(EstimateRef::Checked(found)) => self.check_estimate(own.cycle(), view, found, &name)?,
                 None => (),
             }
         }
-        let planes = |view: usize| sources.get(view).copied().flatten().map(AnyEstimate::planes);
+        let planes = |view: usize| sources.get(view).copied().flatten().map(EstimateRef::planes);
         let planes = SourcePlanes::new(self.sources(own.view()), planes);
         let verdicts = stages::check(&self.0, own, planes, &|_| Ok(()))?;
         let mut checked = stages::apply_check(own.clone(), &verdicts);

@@ -130,7 +130,7 @@ impl Scene {
     fn outlier(&self, pixel: usize, random: &mut Random) -> PixelEstimate {
         let depth = self.search_range().clamp(2.0 + 6.0 * random.unit());
         let normal = (random.facing_normal(self.ray(pixel)) - 0.1 * self.ray(pixel)).normalize();
-        PixelEstimate { depth, normal, cost: 1.5.into(), consistent: 1, validated: false }
+        PixelEstimate { depth, normal, cost: 1.5.into(), consistent_views: 1, validated: false }
     }
 
     /// A validated plane near the wall, or the wall moved towards the camera.
@@ -141,7 +141,7 @@ impl Scene {
             depth: self.search_range().clamp(depth),
             normal: (testing::normal(&self.camera) + tilt).normalize(),
             cost: 0.1.into(),
-            consistent: 4,
+            consistent_views: 4,
             validated: true,
         }
     }
@@ -234,7 +234,7 @@ impl Scene {
 /// The exact wall, some of it not validated, stays up to rounding.
 fn assert_exact_planes_stay(make: MakeFilter) {
     let mut scene = Scene::random(0, SIZE, RANGE);
-    scene.planes = testing::exact(&scene.camera).solutions;
+    scene.planes = testing::exact(&scene.camera).planes;
     for (pixel, plane) in scene.planes.iter_mut().enumerate() {
         let mut random = Random::new(1, pixel as u64);
         plane.validated = !scene.is_textureless[pixel] && random.unit() < 0.9;
@@ -248,7 +248,7 @@ fn assert_exact_planes_stay(make: MakeFilter) {
 
 /// The parts of an estimate as they can be compared to the bit.
 fn bits(estimate: &PixelEstimate) -> ([u32; 5], u8, bool) {
-    let PixelEstimate { depth, normal, cost, consistent, validated } = *estimate;
+    let PixelEstimate { depth, normal, cost, consistent_views, validated } = *estimate;
     let floats = [depth, normal.x, normal.y, normal.z, cost.into()].map(f32::to_bits);
-    (floats, consistent, validated)
+    (floats, consistent_views, validated)
 }

@@ -310,7 +310,7 @@ mod tests {
         let estimate = |pixel| PixelEstimate {
             depth: if is_near(pixel) { 4.0 } else { background },
             normal: Vec3::NEG_Z,
-            consistent: 3,
+            consistent_views: 3,
             validated: true,
             ..PixelEstimate::default()
         };

@@ -156,7 +156,7 @@ mod tests {
                 false => PixelEstimate { validated: true, ..exact },
             }
         };
-        testing::exact(&camera()).solutions.into_iter().enumerate().map(estimate).collect()
+        testing::exact(&camera()).planes.into_iter().enumerate().map(estimate).collect()
     }
 
     /// Fills the gaps; the filled pixels are those with a result.
@@ -178,7 +178,7 @@ mod tests {
         let filled = filled.expect("filled");
         assert!((filled.depth / depth - 1.0).abs() < 1e-4, "{filled:?} instead of {depth}");
         assert!((filled.normal - normal).length() < 1e-4, "{filled:?} instead of {normal}");
-        assert_eq!((filled.validated, filled.consistent), (false, 0), "not checked yet");
+        assert_eq!((filled.validated, filled.consistent_views), (false, 0), "not checked yet");
     }
 
     #[test]
@@ -234,7 +234,7 @@ mod tests {
         let mut planes = wall(|x, y| !(y == 15 && (15..17).contains(&x)));
         assert!(fill(|_| 100, RANGE, &planes).iter().all(Option::is_none));
         let third = GRID.index((17, 15));
-        planes[third] = PixelEstimate { validated: true, ..testing::exact(&camera()).solutions[third] };
+        planes[third] = PixelEstimate { validated: true, ..testing::exact(&camera()).planes[third] };
         assert!(fill(|_| 100, RANGE, &planes).iter().any(Option::is_some));
     }
 

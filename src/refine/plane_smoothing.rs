@@ -206,7 +206,7 @@ mod tests {
     /// The wall, validated everywhere.
     fn wall() -> Vec<PixelEstimate> {
         let validated = |exact: PixelEstimate| PixelEstimate { validated: true, ..exact };
-        testing::exact(&camera()).solutions.into_iter().map(validated).collect()
+        testing::exact(&camera()).planes.into_iter().map(validated).collect()
     }
 
     fn smooth(gray: impl Fn(usize) -> u8, range: DepthRange, planes: &mut [PixelEstimate]) {

@@ -11,7 +11,7 @@ use crate::image::Picture;
 pub(crate) use compact_plane::CompactPlane;
 use glam::DVec3;
 pub use maps::{Maps, PixelStatus};
-pub(crate) use plane_map::{PixelEstimate, PlaneMap, RankingCost, Verdict, validated_planes};
+pub(crate) use plane_map::{PixelEstimate, PlaneMap, Verdict, validated_planes};
 pub(crate) use scaled_view::ScaledView;
 
 /// One calibrated photograph.

@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plane_is_handed_up_exactly_also_to_odd_sizes() {
+    fn upsampling_keeps_a_plane_also_at_odd_sizes() {
         for size in [(36, 28), (35, 27), (5, 3), (2, 1), (1, 1)] {
             let fine = testing::camera(0.7, size);
             let coarse = fine.halved();
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn four_fine_pixels_follow_their_coarse_one() {
+    fn four_fine_pixels_take_the_plane_of_their_coarse_one() {
         let fine = testing::camera(0.0, (6, 4));
         let coarse = fine.halved();
         let mut map = testing::exact(&coarse);
@@ -160,11 +160,12 @@ mod tests {
         map.planes[none] = PixelEstimate::default();
         map.planes[none + 1].validated = true;
         let upsampled = map.upsample(&coarse, &fine, RANGE);
+        let surface = upsampled.publish(&fine);
         for pixel in 0..24 {
             let parent = pixel / 6 / 2 * 3 + pixel % 6 / 2;
             assert_eq!(upsampled.planes[pixel].depth == 0.0, parent == none);
             assert_eq!(upsampled.planes[pixel].validated, parent == none + 1);
-            assert_eq!(upsampled.surface[pixel].inverse_depth() > 0.0, parent == none + 1);
+            assert_eq!(surface[pixel].inverse_depth() > 0.0, parent == none + 1);
         }
     }
 
@@ -182,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn a_normal_that_is_handed_up_faces_the_camera_in_every_fine_pixel() {
+    fn an_upsampled_normal_faces_the_camera_in_every_fine_pixel() {
         let fine = testing::camera(0.0, (36, 28));
         let coarse = fine.halved();
         let mut map = testing::exact(&coarse);
@@ -202,19 +203,20 @@ mod tests {
     }
 
     #[test]
-    fn marking_shows_the_validated_planes_to_other_views() {
+    fn a_map_publishes_its_validated_planes() {
         let camera = testing::camera(0.0, (6, 4));
         let mut map = testing::exact(&camera);
         let verdicts: Vec<(u8, bool)> = (0..24).map(|pixel| (pixel, pixel % 3 == 0)).collect();
-        map.mark(&camera, &verdicts);
-        assert_eq!(map.validated(), 8);
+        map.set_verdicts(&verdicts);
+        assert_eq!(map.count_validated(), 8);
+        let surface = map.publish(&camera);
         for (pixel, plane) in map.planes.iter().enumerate() {
             assert_eq!((plane.consistent_views, plane.validated), verdicts[pixel]);
-            let plane = &map.surface[pixel];
-            let shown = if pixel % 3 == 0 { 1.0 / plane.depth } else { 0.0 };
-            assert_eq!(plane.inverse_depth(), shown);
+            let published = &surface[pixel];
+            let inverse_depth = if pixel % 3 == 0 { 1.0 / plane.depth } else { 0.0 };
+            assert_eq!(published.inverse_depth(), inverse_depth);
             if plane.validated && pixel % 6 < 5 {
-                let right = 1.0 / (plane.inverse_depth() + plane.slopes().0);
+                let right = 1.0 / (published.inverse_depth() + published.slopes().0);
                 assert!((right / testing::depth(&camera, pixel + 1) - 1.0).abs() < 1e-5);
             }
         }

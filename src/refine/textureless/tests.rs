@@ -46,7 +46,7 @@ fn exact(world: &World, pixel: usize) -> PixelEstimate {
         depth: testing::depth(camera, pixel),
         normal: testing::normal(camera),
         cost: 0.1.into(),
-        consistent: 0,
+        consistent_views: 0,
         validated: true,
     }
 }
