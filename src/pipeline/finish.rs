@@ -13,7 +13,8 @@ use crate::geometry::ViewSets;
 use crate::matching::Problem;
 use crate::pipeline::ViewResult;
 use crate::pipeline::{Hook, Phase, Tracker};
-use crate::refine::gap_filling as closing;
+use crate::refine::gap_filling::FillGaps;
+use crate::refine::{Filter, FilteredView};
 use crate::scene::CompactPlane;
 use crate::scene::ScaledView;
 use crate::scene::{PixelEstimate, PlaneMap};
@@ -66,7 +67,10 @@ impl Stepper {
         }
         let problem = self.problem(cycle, view, &|view| surface_of(estimates, view));
         let ScaledView { camera, image, range, .. } = self.scaled(cycle, view);
-        let candidates = closing::candidates(camera, image, *range, &self.averaged(own, &problem));
+        let mut filled = self.averaged(own, &problem);
+        let pixels = FillGaps.apply(&FilteredView { camera, image, range: *range }, &mut filled);
+        let mut candidates = vec![PixelEstimate::default(); filled.len()];
+        pixels.iter().for_each(|&pixel| candidates[pixel as usize] = filled[pixel as usize]);
         let mut sets = ViewSets::empty(candidates.len(), problem.sources.len());
         let made = candidates.iter().enumerate().filter(|(_, offer)| offer.depth > 0.0);
         let made: Vec<_> = made.map(|(pixel, offer)| (pixel, offer.depth, offer.normal)).collect();

@@ -10,9 +10,10 @@ use crate::geometry::ViewSets;
 use crate::matching::{Problem, Source};
 use crate::pipeline::CycleRecord;
 use crate::pipeline::{Cancelled, Hook, Phase, Tracker};
-use crate::refine::foreground_fattening::trim;
-use crate::refine::plane_smoothing::smooth;
-use crate::refine::textureless::fill;
+use crate::refine::foreground_fattening::CorrectFattening;
+use crate::refine::plane_smoothing::SmoothPlanes;
+use crate::refine::textureless::FillTextureless;
+use crate::refine::{Filter, FilteredView};
 use crate::scene::CompactPlane;
 use crate::scene::ScaledView;
 use crate::scene::{PixelEstimate, PlaneMap};
@@ -142,7 +143,7 @@ impl Stepper {
         advance: &(dyn Fn(u64) -> bool + Sync),
     ) -> Result<ViewEstimate> {
         let schedule = self.all()[cycle];
-        let ScaledView { camera, mask, .. } = self.scaled(cycle, view);
+        let ScaledView { camera, image, mask, range, .. } = self.scaled(cycle, view);
         let mut estimate = ViewEstimate {
             view,
             cycle,
@@ -174,25 +175,26 @@ impl Stepper {
                 ..self.plain_search(cycle, &problem, shown.is_guided, &cancelled)
             };
             let mut found = search.run()?;
-            let filled = fill(&problem, &mut found.best, &found.weak);
-            let plane = |&pixel: &usize| {
-                let FoodSource { depth, normal, .. } = found.best[pixel];
-                (pixel, depth, normal)
-            };
-            let filled: Vec<_> = filled.iter().map(plane).collect();
-            select_sets(&problem, search.view_rules, &mut found.sets, &filled);
-            estimate.counts += found.counts;
             let solution = |food: &FoodSource| PixelEstimate {
                 depth: food.depth,
                 normal: food.normal,
                 cost: food.cost.into(),
-                ..PixelEstimate::default()
+                consistent: 0,
+                validated: food.validated,
             };
-            estimate.solved = PlaneMap {
-                solutions: found.best.par_iter().map(solution).collect(),
-                sets: found.sets,
-                surface: Vec::new(),
+            let mut solutions: Vec<PixelEstimate> = found.best.par_iter().map(solution).collect();
+            let filter = FillTextureless { problem: &problem, is_textureless: &found.weak };
+            let filled = filter.apply(&FilteredView { camera, image, range: *range }, &mut solutions);
+            let plane = |&pixel: &u32| {
+                let PixelEstimate { depth, normal, .. } = solutions[pixel as usize];
+                (pixel as usize, depth, normal)
             };
+            let filled: Vec<_> = filled.iter().map(plane).collect();
+            select_sets(&problem, search.view_rules, &mut found.sets, &filled);
+            estimate.counts += found.counts;
+            // Nothing of this cycle is checked yet.
+            solutions.par_iter_mut().for_each(|solution| solution.validated = false);
+            estimate.solved = PlaneMap { solutions, sets: found.sets, surface: Vec::new() };
         }
         let solutions = &estimate.solved.solutions;
         estimate.cycles.push(CycleRecord {
@@ -260,20 +262,14 @@ impl Stepper {
         }
         let ScaledView { camera, image, range, .. } = self.scaled(estimate.cycle(), view);
         estimate.solved.judge(&verdicts.0);
+        let filtered = FilteredView { camera, image, range: *range };
         if self.may_end_scale(estimate) {
-            let is_last = estimate.cycle() + 1 == self.all().len();
-            trim(
-                camera,
-                image,
-                *range,
-                &mut estimate.solved.solutions,
-                self.options.refine.fattening_passes,
-                is_last,
-            );
+            let is_last_cycle = estimate.cycle() + 1 == self.all().len();
+            let passes = self.options.refine.fattening_passes;
+            CorrectFattening { passes, is_last_cycle }.apply(&filtered, &mut estimate.solved.solutions);
         }
-        for _ in 0..self.options.refine.smoothing_passes {
-            smooth(camera, image, *range, &mut estimate.solved.solutions);
-        }
+        let passes = self.options.refine.smoothing_passes;
+        SmoothPlanes { passes }.apply(&filtered, &mut estimate.solved.solutions);
         estimate.solved.show(camera);
         estimate.marked = true;
         let validated = estimate.solved.validated();
