@@ -19,7 +19,7 @@
 
 use super::stencil::{Border, PaddedMap};
 use super::{Domain, Filter, FilteredView, marked_pixels};
-use crate::geometry::{Grid, Offset, PlaneHypothesis, SlantedPlane};
+use crate::geometry::{Offset, PlaneHypothesis};
 use crate::scene::{PixelEstimate, surface};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -114,8 +114,8 @@ impl RowSums {
 
 impl PlaneMaps {
     fn new(view: &FilteredView, estimates: &[PixelEstimate]) -> PlaneMaps {
-        let grid: Grid = view.grid();
-        let planes: Vec<SlantedPlane> = surface(view.camera, estimates);
+        let grid = view.grid();
+        let planes = surface(view.camera, estimates);
         let border = Border { width: RADIUS, value: 0.0 };
         let padded = |value: &(dyn Fn(usize) -> f32 + Sync)| PaddedMap::new(grid, border, value);
         PlaneMaps {

@@ -65,12 +65,12 @@ impl Filter for FillTextureless<'_> {
 
     fn apply(&self, view: &FilteredView, planes: &mut [PixelEstimate]) -> Vec<u32> {
         let grid = view.grid();
-        let mut scratch = PixelSet::new(planes.len());
+        let mut scratch = PixelSet::new(grid.pixels());
         let is_enclosed = region::find_enclosed(grid, self.is_textureless);
-        let mut is_traced = vec![false; planes.len()];
+        let mut is_traced = vec![false; grid.pixels()];
         let mut filled = Vec::new();
         let mut regions = 0;
-        for pixel in 0..planes.len() {
+        for pixel in 0..grid.pixels() {
             if is_traced[pixel] || !region::is_open(planes, self.is_textureless, pixel) {
                 continue;
             }
