@@ -72,14 +72,13 @@ impl Rectangle {
 }
 
 /// What a filter returns and leaves.
-#[derive(PartialEq)]
 struct Filtered {
     replaced: Vec<u32>,
     planes: Vec<PixelEstimate>,
 }
 
-/// A strip before a slanted wall, with errors of search, outliers, pixels without a plane, a fattened edge, and textureless
-/// discs without validated planes.
+/// A strip before a slanted wall, with errors of search, outliers, pixels without a plane, a fattened edge,
+/// and textureless discs without validated planes.
 struct Scene {
     grid: Grid,
     camera: Camera,

@@ -1,18 +1,20 @@
-//! Correction of foreground fattening: a window at the edge of a near surface matches by the texture of that surface even
-//! where its center is already on the background, so that near surfaces come out too wide. The gray values tell which of
-//! the two surfaces a pixel is on.
+//! Correction of foreground fattening: a window at the edge of a near surface matches by the texture of that
+//! surface even where its center is already on the background, so that near surfaces come out too wide. The
+//! gray value of a pixel decides which of the two surfaces it is on.
 //!
-//! Around each validated pixel, bilateral weights are summed over the neighbors on the pixel's own surface (their planes
-//! have the same inverse depth there, within `SAME_SURFACE`), on surfaces behind it (smaller by `BEHIND` at least), and over
-//! those without a validated plane. Where the background has the larger sum, the pixel gets the weighted mean of the
-//! background's inverse depths and normals. In the last cycle, a pixel among many without a plane loses its validation.
+//! Around each validated pixel, bilateral weights are summed over the neighbors on the pixel's own surface
+//! (their planes have the same inverse depth there, within `SAME_SURFACE`), on surfaces behind it (smaller by
+//! `BEHIND` at least), and over those without a validated plane. Where the background has the larger sum, the
+//! pixel gets the weighted mean of the background's inverse depths and normals. In the last cycle, a pixel
+//! among many without a plane loses its validation.
 //!
-//! Reads the validated planes and the gray values; changes depth, normal and `validated` of validated planes. A pass visits
-//! 12 neighbors of every pixel, whole rows at a time, and all 120 neighbors of the pixels near a depth edge; later passes
-//! visit only what is near a change of the pass before.
+//! Reads the validated planes and the gray values; changes depth, normal and `validated` of validated planes.
+//! A pass visits 12 neighbors of every pixel, whole rows at a time, and all 120 neighbors of the pixels near
+//! a depth edge; later passes visit only what is near a change of the pass before.
 //!
-//! Sources: the effect is described by Scharstein and Szeliski, "A taxonomy and evaluation of dense two-frame stereo
-//! correspondence algorithms" (2002); the weights are those of a bilateral filter (Tomasi and Manduchi, 1998).
+//! Sources: the effect is described by Scharstein and Szeliski, "A taxonomy and evaluation of dense two-frame
+//! stereo correspondence algorithms" (2002); the weights are those of a bilateral filter (Tomasi and
+//! Manduchi, 1998).
 
 use super::stencil::{BilateralStencil, Border, GrayWeights, PaddedMap, Stencil};
 use super::{Domain, Filter, FilteredView, marked_pixels};
@@ -22,23 +24,23 @@ use glam::Vec3;
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
 
-/// Radius of the neighborhood in pixels: surfaces are hardly fattened by more, as that is the radius of a window.
+/// Radius of the neighborhood in pixels: surfaces are hardly ever fattened by more.
 const RADIUS: i32 = 6;
 /// Distance in pixels with weight 1 / sqrt(e), 2 / 3 of the radius.
 const SPATIAL_SIGMA: f32 = 4.0;
 /// Difference of gray values (0 to 255) with weight 1 / sqrt(e): a few deviations of a photograph's noise.
 const GRAY_SIGMA: f32 = 6.0;
-/// Relative difference of inverse depths below which a neighbor is on the pixel's surface; equal to the largest error of
-/// depth that the default check tolerates.
+/// Relative difference of inverse depths below which a neighbor is on the pixel's surface; equal to the
+/// largest error of depth that the default check tolerates.
 const SAME_SURFACE: f32 = 0.01;
-/// Relative decrease of inverse depth from which a neighbor is on a surface behind: twice `SAME_SURFACE`, so that rounded
-/// edges are neither.
+/// Relative decrease of inverse depth from which a neighbor is on a surface behind: twice `SAME_SURFACE`, so
+/// that rounded edges are neither.
 const BEHIND: f32 = 0.02;
-/// Factor by which the weight of neighbors without a plane must exceed that of the pixel's surface to end its validation:
-/// they may also be gaps in the surface.
+/// Factor by which the weight of neighbors without a plane must exceed that of the pixel's surface to end its
+/// validation: they may also be gaps in the surface.
 const EMPTY_FACTOR: f32 = 2.0;
-/// Offsets of the neighbors that reveal a depth edge nearby, at half of the radius and at the radius: a background that
-/// outweighs the pixel's surface is wide enough to cover one of them.
+/// Offsets of the neighbors that reveal a depth edge nearby, at half of the radius and at the radius: a
+/// background that outweighs the pixel's surface is wide enough to cover one of them.
 const PROBES: [Offset; 12] =
     [(3, 0), (-3, 0), (0, 3), (0, -3), (6, 0), (-6, 0), (0, 6), (0, -6), (4, 4), (-4, 4), (4, -4), (-4, -4)];
 
@@ -46,8 +48,8 @@ const PROBES: [Offset; 12] =
 pub struct CorrectFattening {
     /// How many times the edges are moved, each time by a few pixels at most.
     pub passes: u32,
-    /// Whether no search follows: then pixels without a plane count as background, and validated pixels among them lose
-    /// their validation. Before that, a search may still find planes there.
+    /// Whether no search follows: then pixels without a plane count as background, and validated pixels among
+    /// them lose their validation. Before that, a search may still find planes there.
     pub is_last_cycle: bool,
 }
 
@@ -108,7 +110,8 @@ struct ChangedBlocks {
 }
 
 impl ChangedBlocks {
-    /// Side of a block in pixels: not less than the radius, so that a neighborhood touches at most 3 x 3 blocks.
+    /// Side of a block in pixels: not less than the radius, so that a neighborhood touches at most 3 x 3
+    /// blocks.
     const SIDE: usize = 8;
 
     fn all(grid: Grid) -> ChangedBlocks {
@@ -239,8 +242,8 @@ impl Classifier<'_> {
         if self.is_last_cycle && empty > EMPTY_FACTOR * same { Assignment::Nothing } else { Assignment::Own }
     }
 
-    /// Relative difference from a pixel's inverse depth to that of the plane of its neighbor at an offset, `None` if the
-    /// neighbor has no validated plane.
+    /// Relative difference from a pixel's inverse depth to that of the plane of its neighbor at an offset,
+    /// `None` if the neighbor has no validated plane.
     fn relative_difference(&self, own: f32, neighbor: usize, (dx, dy): Offset) -> Option<f32> {
         let plane = &self.surfaces[neighbor];
         let predicted = plane.inverse_depth_at(-dx as f32, -dy as f32);

@@ -1,10 +1,10 @@
-//! Gap filling: after the last check, each pixel without a validated plane gets the plane of the surrounding surface whose
-//! pixels have the most similar gray values. The caller checks the new planes against the source views once more: most
-//! such pixels were close to that surface and failed the check by their normal.
+//! Gap filling: after the last check, each pixel without a validated plane gets the plane of the surrounding
+//! surface whose pixels have the most similar gray values. The caller checks the new planes against the
+//! source views once more: most such pixels were close to that surface and failed the check by their normal.
 //!
-//! Each validated neighbor predicts an inverse depth `w` at the pixel from its plane, with a bilateral weight. Neighbors
-//! whose predictions differ by less than `SAME_SURFACE` are one surface; the surface with the largest sum of weights wins,
-//! and the pixel gets the weighted means of its `w` and normals.
+//! Each validated neighbor predicts an inverse depth `w` at the pixel from its plane, with a bilateral
+//! weight. Neighbors whose predictions differ by less than `SAME_SURFACE` are one surface; the surface with
+//! the largest sum of weights wins, and the pixel gets the weighted means of its `w` and normals.
 //!
 //! Reads the validated planes and the gray values; changes planes that are not validated. For each of those,
 //! O(n^2) comparisons of its up to n = 56 neighbors.
@@ -16,7 +16,8 @@ use crate::scene::{PixelEstimate, validated_planes};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Radius of the neighborhood in pixels: only gaps about as small as a matching window are filled.
+/// Radius of the neighborhood in pixels: gaps of up to twice that width are filled, wider ones along their
+/// rim.
 const RADIUS: i32 = 4;
 /// Distance in pixels with weight 1 / sqrt(e), 2 / 3 of the radius.
 const SPATIAL_SIGMA: f32 = 2.7;
@@ -24,14 +25,14 @@ const SPATIAL_SIGMA: f32 = 2.7;
 const GRAY_SIGMA: f32 = 6.0;
 /// Smallest weight of a difference of gray values: where all neighbors differ, the distance decides.
 const MIN_GRAY_WEIGHT: f32 = 1e-6;
-/// Relative difference of inverse depths below which two neighbors are on the same surface; equal to the largest error of
-/// depth that the default check tolerates.
+/// Relative difference of inverse depths below which two neighbors are on the same surface; equal to the
+/// largest error of depth that the default check tolerates.
 const SAME_SURFACE: f32 = 0.01;
 /// Fewest neighbors of a surface: fewer may be outliers that passed the check by chance.
 const MIN_NEIGHBORS: usize = 3;
 
-/// Replaces planes that are not validated by the plane of the surrounding surface, as yet unchecked: cost 0, 0 consistent
-/// source views, not validated. Pixels without such a surface keep theirs.
+/// Replaces planes that are not validated by the plane of the surrounding surface, as yet unchecked: cost 0,
+/// 0 consistent source views, not validated. Pixels without such a surface keep theirs.
 pub struct FillGaps;
 
 impl Filter for FillGaps {

@@ -2,12 +2,17 @@
 //!
 //! | filter | when | replaces |
 //! |---|---|---|
-//! | [`FillTextureless`](textureless::FillTextureless) | after every search | planes in and around textureless regions |
-//! | [`CorrectFattening`](foreground_fattening::CorrectFattening) | after the last check of a scale | validated planes |
-//! | [`SmoothPlanes`](plane_smoothing::SmoothPlanes) | after every check | validated planes |
-//! | [`FillGaps`](gap_filling::FillGaps) | after the last cycle | planes that are not validated |
+//! | [`FillTextureless`] | after every search | planes in and around textureless regions |
+//! | [`CorrectFattening`] | after the last check of a scale | validated planes |
+//! | [`SmoothPlanes`] | after every check | validated planes |
+//! | [`FillGaps`] | after the last cycle | planes that are not validated |
 //!
 //! All of them implement [`Filter`] and pass the test in `contract.rs`.
+//!
+//! [`FillTextureless`]: textureless::FillTextureless
+//! [`CorrectFattening`]: foreground_fattening::CorrectFattening
+//! [`SmoothPlanes`]: plane_smoothing::SmoothPlanes
+//! [`FillGaps`]: gap_filling::FillGaps
 
 pub mod foreground_fattening;
 pub mod gap_filling;
@@ -77,14 +82,15 @@ impl Domain {
 /// A filter of the planes of one view, in place.
 ///
 /// The contract, which `contract.rs` tests for every filter:
-/// - pixels outside of the domain keep their estimates, to the bit; pixels without a plane are outside of every domain;
+/// - pixels outside of the domain keep their estimates, to the bit; pixels without a plane are outside of
+///   every domain;
 /// - new planes are usable: depth in the range, unit normal that faces the camera, no NaN;
 /// - a plane that the surrounding planes agree with stays the same up to rounding (relative 1e-5);
 /// - the result is the same, to the bit, for every number of threads;
 /// - a new estimate depends on nothing farther away than the reach.
 pub trait Filter: Sync {
-    /// Largest distance in pixels, along x or y, of a plane or gray value that the new estimate of a pixel depends on;
-    /// `None` where it depends on a region of any size.
+    /// Largest distance in pixels, along x or y, of a plane or gray value that the new estimate of a pixel
+    /// depends on; `None` where it depends on a region of any size.
     #[cfg_attr(
         not(test),
         allow(dead_code, reason = "filters run on whole images so far; the contract test reads it")
@@ -94,8 +100,8 @@ pub trait Filter: Sync {
     /// The pixels whose estimates it may replace.
     fn domain(&self) -> Domain;
 
-    /// Replaces estimates and returns the pixels with a replaced one (also where the new one is equal), ascending, each
-    /// once.
+    /// Replaces estimates and returns the pixels with a replaced one (also where the new one is equal),
+    /// ascending, each once.
     fn apply(&self, view: &FilteredView, planes: &mut [PixelEstimate]) -> Vec<u32>;
 }
 

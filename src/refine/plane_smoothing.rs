@@ -1,46 +1,49 @@
-//! Bilateral smoothing of planes: each validated plane is averaged with the validated planes around it that continue the
-//! same surface. Matching windows of neighboring pixels overlap, but their errors of search are independent and average
-//! out.
+//! Bilateral smoothing of planes: each validated plane is averaged with the validated planes around it that
+//! continue the same surface. Matching windows of neighboring pixels overlap, but their errors of search are
+//! independent and average out.
 //!
-//! Let a neighbor at `(dx, dy)` have the inverse depth `w'`, slopes `s'` and unit normal `n'`, and the pixel `w` and `n`.
-//! The neighbor's plane has the inverse depth `p = w' - s'.x dx - s'.y dy` at the pixel, and its weight is
+//! Let a neighbor at `(dx, dy)` have the inverse depth `w'`, slopes `s'` and unit normal `n'`, and the pixel
+//! `w` and `n`. The neighbor's plane has the inverse depth `p = w' - s'.x dx - s'.y dy` at the pixel, and its
+//! weight is
 //!
 //! ```text
 //! exp(-((p - w) / (w DEPTH_SIGMA))^2 / 2 - (1 - n . n') / NORMAL_SCALE
 //!     - (difference of gray values / GRAY_SIGMA)^2 / 2 - (dx^2 + dy^2) / (2 SPATIAL_SIGMA^2))
 //! ```
 //!
-//! The new inverse depth is the weighted mean of `p`, the new normal that of `n'`. Reads the validated planes and the gray
-//! values; changes depth and normal of validated planes. Each pass visits 12 neighbors of each
-//! pixel, whole rows at a time.
+//! with `(1 - e / 8)^8` for `exp(-e)`. The new inverse depth is the weighted mean of `p`, the new normal that
+//! of `n'`. Reads the validated planes and the gray values; changes depth and normal of validated planes.
+//! Each pass visits 12 neighbors of each pixel, whole rows at a time.
 //!
 //! Source: the bilateral filter (Tomasi and Manduchi, 1998), on planes.
 
 use super::stencil::{Border, PaddedMap};
 use super::{Domain, Filter, FilteredView, marked_pixels};
-use crate::geometry::{Grid, Offset, PlaneHypothesis, SlantedPlane};
+use crate::geometry::{Offset, PlaneHypothesis};
 use crate::scene::{PixelEstimate, validated_planes};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Radius of the neighborhood in pixels, about 1.5 `SPATIAL_SIGMA`: neighbors farther away weigh less than a third.
+/// Radius of the neighborhood in pixels, about 1.5 `SPATIAL_SIGMA`: neighbors farther away weigh less than a
+/// third.
 const RADIUS: usize = 4;
-/// Spacing of the sampled neighbors along x and y, in pixels: windows of adjacent pixels share most of their samples, so
-/// that the neighbors between add work and little information.
+/// Spacing of the sampled neighbors along x and y, in pixels: windows of adjacent pixels share most of their
+/// samples, so that the neighbors between add work and little information.
 const STEP: usize = 2;
-/// Relative difference of inverse depths with weight 1 / sqrt(e): above the errors of search, below the steps between
-/// surfaces. Chosen on renderings.
+/// Relative difference of inverse depths with weight 1 / sqrt(e): above the errors of search, below the steps
+/// between surfaces. Chosen on renderings.
 const DEPTH_SIGMA: f32 = 0.004;
-/// `1 - cos` of the angle between normals with weight 1 / e, 30 degrees: wide, as a window determines its normal far less
-/// precisely than its depth.
+/// `1 - cos` of the angle between normals with weight 1 / e, 30 degrees: wide, as a window determines its
+/// normal far less precisely than its depth.
 const NORMAL_SCALE: f32 = 0.134;
 /// Difference of gray values (0 to 255) with weight 1 / sqrt(e): several deviations of a photograph's noise.
 const GRAY_SIGMA: f32 = 10.0;
-/// Distance in pixels with weight 1 / sqrt(e): the smoothing must not be much wider than a matching window.
+/// Distance in pixels with weight 1 / sqrt(e): errors are independent beyond about that distance, as windows
+/// no longer share most of their samples.
 const SPATIAL_SIGMA: f32 = 2.7;
 
-/// Replaces each validated plane by the bilateral mean of the validated planes around it; planes whose mean is not usable
-/// stay.
+/// Replaces each validated plane by the bilateral mean of the validated planes around it; planes whose mean
+/// is not usable stay.
 pub struct SmoothPlanes {
     /// How many times the planes are smoothed, each time reading the result of the pass before.
     pub passes: u32,
@@ -111,8 +114,8 @@ impl RowSums {
 
 impl PlaneMaps {
     fn new(view: &FilteredView, estimates: &[PixelEstimate]) -> PlaneMaps {
-        let grid: Grid = view.grid();
-        let planes: Vec<SlantedPlane> = validated_planes(view.camera, estimates);
+        let grid = view.grid();
+        let planes = validated_planes(view.camera, estimates);
         let border = Border { width: RADIUS, value: 0.0 };
         let padded = |value: &(dyn Fn(usize) -> f32 + Sync)| PaddedMap::new(grid, border, value);
         PlaneMaps {

@@ -1,5 +1,5 @@
-//! Neighborhoods of the filters: maps with a border for whole rows at a time, and the weighted disc of a bilateral filter
-//! for single pixels.
+//! Neighborhoods of the filters: maps with a border for whole rows at a time, and the weighted disc of a
+//! bilateral filter for single pixels.
 
 use crate::geometry::{Grid, Offset, Position};
 use crate::image::PackedImage;
@@ -51,7 +51,8 @@ fn gaussian(value: f32, sigma: f32) -> f32 {
 pub struct Stencil(Vec<(Offset, f32)>);
 
 impl Stencil {
-    /// The disc with `dx^2 + dy^2 <= radius^2 + 1`, weighted by a Gaussian of the distance; both lengths in pixels.
+    /// The disc with `dx^2 + dy^2 <= radius^2 + 1`, weighted by a Gaussian of the distance; both lengths in
+    /// pixels.
     pub fn disc(radius: i32, sigma: f32) -> Stencil {
         let offsets = (-radius..=radius).flat_map(|dy| (-radius..=radius).map(move |dx| (dx, dy)));
         let is_inside = |&(dx, dy): &Offset| dx * dx + dy * dy <= radius * radius + 1 && (dx, dy) != (0, 0);
@@ -70,8 +71,8 @@ impl GrayWeights {
     }
 }
 
-/// The neighborhood of a bilateral filter (Tomasi and Manduchi, 1998): neighbors are weighted by their distance and by the
-/// difference of their gray value.
+/// The neighborhood of a bilateral filter (Tomasi and Manduchi, 1998): neighbors are weighted by their
+/// distance and by the difference of their gray value.
 pub struct BilateralStencil {
     /// Weights by distance.
     pub spatial: Stencil,

@@ -1,5 +1,5 @@
-//! Filling of textureless regions: where the image has nothing but noise no search finds a surface, but the surroundings
-//! suggest one.
+//! Filling of textureless regions: where the image has nothing but noise no search finds a surface, but the
+//! surroundings suggest one.
 //!
 //! ```text
 //! for each connected region of textureless pixels without a validated plane:
@@ -10,12 +10,12 @@
 //!     give the best plane to all pixels of the region
 //! ```
 //!
-//! Reads the validated planes, the gray values of the view and of its source views; changes depth, normal and `validated`
-//! of the pixels of a region, and keeps their cost. `validated` means here that the plane comes from a validated plane; the
-//! next check decides about the filled ones like about all others.
+//! Reads the validated planes, the gray values of the view and of its source views; changes depth, normal and
+//! `validated` of the pixels of a region, and keeps their cost. `validated` means here that the plane comes
+//! from a validated plane; the next check decides about the filled ones like about all others.
 //!
-//! Linear in the number of pixels, and for each region `MAX_PLANES` RANSAC searches and as many photo checks, which have
-//! bounded numbers of samples.
+//! Linear in the number of pixels, and for each region `MAX_PLANES` RANSAC searches and as many photo checks,
+//! which have bounded numbers of samples.
 
 mod photo_check;
 mod region;
@@ -32,16 +32,16 @@ use photo_check::PhotoCheck;
 use region::{PixelSet, Region};
 use rim_planes::{RimPlane, RimSample, fit_rim_planes};
 
-/// Fraction of a region's outline that must lie beside pixels on the plane, where the photo check confirms the plane: a
-/// panel may touch its own surface on one side only.
+/// Fraction of a region's outline that must lie beside pixels on the plane, where the photo check confirms
+/// the plane: a panel may touch its own surface on one side only.
 const MIN_RIM_CONFIRMED: f64 = 0.2;
-/// The same where too few source views see the region for a photo check: the ground below a sky is on one side of it
-/// only, and must not fill it.
+/// The same where too few source views see the region for a photo check: the ground below a sky is on one
+/// side of it only, and must not fill it.
 const MIN_RIM_UNCHECKED: f64 = 0.6;
 /// Fraction of the outline that must match in the source views. Chosen on renderings.
 const MIN_MATCHING: f64 = 0.8;
-/// Weight of the fraction of the rim that is on a plane against the fraction of the outline that matches. Measured on
-/// renderings: 0.05 loses completeness.
+/// Weight of the fraction of the rim that is on a plane against the fraction of the outline that matches.
+/// Measured on renderings: 0.05 loses completeness.
 const RIM_WEIGHT: f64 = 0.1;
 
 /// Fills each textureless region with the plane of its surroundings that the source views confirm.
@@ -57,19 +57,20 @@ impl Filter for FillTextureless<'_> {
         None
     }
 
-    /// A region grows also over validated pixels: their windows may have matched by what is beside the region.
+    /// A region grows also over validated pixels: their windows may have matched by what is beside the
+    /// region.
     fn domain(&self) -> Domain {
         Domain::All
     }
 
     fn apply(&self, view: &FilteredView, planes: &mut [PixelEstimate]) -> Vec<u32> {
         let grid = view.grid();
-        let mut scratch = PixelSet::new(planes.len());
+        let mut scratch = PixelSet::new(grid.pixels());
         let is_enclosed = region::find_enclosed(grid, self.is_textureless);
-        let mut is_traced = vec![false; planes.len()];
+        let mut is_traced = vec![false; grid.pixels()];
         let mut filled = Vec::new();
         let mut regions = 0;
-        for pixel in 0..planes.len() {
+        for pixel in 0..grid.pixels() {
             if is_traced[pixel] || !region::is_open(planes, self.is_textureless, pixel) {
                 continue;
             }
@@ -134,7 +135,8 @@ impl FillTextureless<'_> {
     }
 }
 
-/// `[x y 1]` of a pixel: the inverse depth of a plane there is the scalar product with the plane's coefficients.
+/// `[x y 1]` of a pixel: the inverse depth of a plane there is the scalar product with the plane's
+/// coefficients.
 fn homogeneous(grid: Grid, pixel: usize) -> DVec3 {
     let (x, y) = grid.position(pixel);
     DVec3::new(x as f64, y as f64, 1.0)
@@ -148,8 +150,8 @@ fn rim_samples(grid: Grid, rim: &[usize], planes: &[PixelEstimate]) -> Vec<RimSa
     rim.iter().map(sample).collect()
 }
 
-/// The plausible plane with the best score; `surface_fraction` is that of the region's outline, `matching` the result of
-/// the photo check, `None` where there is none.
+/// The plausible plane with the best score; `surface_fraction` is that of the region's outline, `matching`
+/// the result of the photo check, `None` where there is none.
 fn best_plane(
     candidates: &[RimPlane],
     surface_fraction: f64,

@@ -1,5 +1,5 @@
-//! Photometric check of a plane for a textureless region: inside the region any plane matches, but through a wrong one the
-//! outline falls on something else in the source views.
+//! Photometric check of a plane for a textureless region: inside the region any plane matches, but through a
+//! wrong one the outline falls on something else in the source views.
 
 use super::homogeneous;
 use crate::geometry::Grid;
@@ -7,14 +7,15 @@ use crate::image::{PackedImage, blurred, deviation};
 use crate::matching::{Problem, Source};
 use glam::DVec3;
 
-/// Largest difference of blurred gray values that matches, in deviations of the view's noise: two and a half times 0.47,
-/// the deviation of a difference of two 3 x 3 means.
+/// Largest difference of blurred gray values that matches, in deviations of the view's noise: two and a half
+/// times 0.47, the deviation of a difference of two 3 x 3 means.
 const MAX_DIFFERENCE_NOISE: f32 = 1.2;
 /// Allowance on top of it, in gray values: rounding and small changes of brightness.
 const MAX_DIFFERENCE_OFFSET: f32 = 0.5;
 /// Fewest source views that must see the region: one alone may match by chance.
 const MIN_VIEWS: usize = 2;
-/// Most samples inside the region, whose median difference is that of the brightness of two views: enough for a median.
+/// Most samples inside the region, whose median difference is that of the brightness of two views: enough for
+/// a median.
 const INNER_SAMPLES: usize = 200;
 /// Radius in pixels of the box blur against noise: 3 x 3 pixels.
 const BLUR_RADIUS: usize = 1;
@@ -49,8 +50,8 @@ impl PhotoCheck {
         }
     }
 
-    /// Fraction of the band that matches in the source views through a plane: the mean of the better half of the views,
-    /// as the region may be occluded in the others. `None` where too few views see it.
+    /// Fraction of the band that matches in the source views through a plane: the mean of the better half of
+    /// the views, as the region may be occluded in the others. `None` where too few views see it.
     pub fn matching_fraction(&self, problem: &Problem, plane: DVec3) -> Option<f64> {
         let mut fractions: Vec<f64> =
             problem.sources.iter().filter_map(|source| self.matching_fraction_in(source, plane)).collect();
@@ -77,7 +78,8 @@ impl PhotoCheck {
 }
 
 impl GraySample {
-    /// Blurred gray value in a source view through a plane, less that in the view; `None` outside the source view.
+    /// Blurred gray value in a source view through a plane, less that in the view; `None` outside the source
+    /// view.
     fn difference(&self, source: &Source, plane: DVec3) -> Option<f32> {
         let inverse_depth =
             Some(plane.dot(self.place) as f32).filter(|&inverse_depth| inverse_depth > 0.0)?;

@@ -4,30 +4,31 @@ use crate::geometry::Grid;
 use crate::image::{PackedImage, blurred, deviation};
 use crate::scene::PixelEstimate;
 
-/// Width in pixels of the rim of validated pixels around a grown region: enough samples for planes, near enough to be of
-/// the adjacent surfaces.
+/// Width in pixels of the rim of validated pixels around a grown region: enough samples for planes, near
+/// enough to be of the adjacent surfaces.
 const RIM_WIDTH: usize = 3;
-/// Fraction of the outline that must not be border of the image: less says too little about the region's surface.
+/// Fraction of the outline that must not be border of the image: less says too little about the region's
+/// surface.
 const MIN_SURFACE_FRACTION: f64 = 0.6;
-/// Fewest sides of pixels with a surface beyond, over the square root of the region's area in pixels: a third of a disc's
-/// outline, which has about 4.5.
+/// Fewest sides of pixels with a surface beyond, over the square root of the region's area in pixels: a third
+/// of a disc's outline, which has about 4.5.
 const MIN_SURFACE_SIDES: f64 = 1.5;
-/// Most sides of pixels at the border of the image, over the square root of the area, of a region that ends within the
-/// image: half a disc has about 1.6, a strip of sky many more.
+/// Most sides of pixels at the border of the image, over the square root of the area, of a region that ends
+/// within the image: half a disc has about 1.6, a strip of sky many more.
 const MAX_BORDER_SIDES: f64 = 2.0;
 /// Pixels by which a region grows at most: windows that reach over its outline are not textureless.
 const MAX_GROWTH: usize = 6;
-/// Largest difference of blurred gray values to a pixel that a region grows over, in deviations of the noise: two deviations
-/// of a difference of a 3 x 3 and a 5 x 5 mean, 0.39 each.
+/// Largest difference of blurred gray values to a pixel that a region grows over, in deviations of the noise:
+/// two deviations of a difference of a 3 x 3 and a 5 x 5 mean, 0.39 each.
 const MAX_DIFFERENCE_NOISE: f32 = 0.8;
 /// Allowance on top of it, in gray values: rounding.
 const MAX_DIFFERENCE_OFFSET: f32 = 0.5;
-/// Radius in pixels of the box blur against noise of the region's pixels, and of those it may grow over: small, to not
-/// blur over the outline.
+/// Radius in pixels of the box blur against noise of the region's pixels, and of those it may grow over:
+/// small, to not blur over the outline.
 const CORE_BLUR_RADIUS: usize = 2;
 const GROWTH_BLUR_RADIUS: usize = 1;
-/// Width in pixels of the band along the inside of the outline that the photo check samples: the errors of a wrong plane
-/// move the outline by a few pixels.
+/// Width in pixels of the band along the inside of the outline that the photo check samples: the errors of a
+/// wrong plane move the outline by a few pixels.
 const BAND_WIDTH: usize = 4;
 /// Most samples of the band; more do not change the fraction that matches much.
 const BAND_SAMPLES: usize = 400;
@@ -102,8 +103,8 @@ pub fn is_open(planes: &[PixelEstimate], is_textureless: &[bool], pixel: usize) 
     is_textureless[pixel] && !planes[pixel].validated && planes[pixel].depth > 0.0
 }
 
-/// Whether each textureless pixel is connected to textureless pixels that end within the image. Those that continue beyond
-/// its border may be a sky, and what surrounds a sky is in front of it.
+/// Whether each textureless pixel is connected to textureless pixels that end within the image. Those that
+/// continue beyond its border may be a sky, and what surrounds a sky is in front of it.
 pub fn find_enclosed(grid: Grid, is_textureless: &[bool]) -> Vec<bool> {
     let mut is_enclosed = vec![false; is_textureless.len()];
     let mut is_traced = vec![false; is_textureless.len()];
@@ -169,8 +170,8 @@ impl Region {
         self.core.iter().chain(&self.grown).copied()
     }
 
-    /// Adds the adjacent pixels with similar gray values: their windows reach over the outline and have matched by what is
-    /// beyond.
+    /// Adds the adjacent pixels with similar gray values: their windows reach over the outline and have
+    /// matched by what is beyond.
     pub fn grow(&mut self, image: &PackedImage, planes: &[PixelEstimate], scratch: &mut PixelSet) {
         let grid = self.grid;
         let neighbors = |pixel| grid.four_neighbors(pixel).into_iter().flatten();
@@ -183,7 +184,7 @@ impl Region {
             let mut next = Vec::new();
             for (pixel, gray) in front {
                 for other in neighbors(pixel).filter(|&other| planes[other].depth > 0.0) {
-                    // Where no noise is known nothing tells a similar gray value from another one.
+                    // Without an estimate of the noise there is no threshold for similar gray values.
                     let noise = deviation(image, other);
                     let difference = (blurred(image, other, GROWTH_BLUR_RADIUS) - gray).abs();
                     let is_similar =

@@ -1,18 +1,21 @@
-//! The planes that the pixels around a region are on: RANSAC, one plane after the other, each refined by least squares.
+//! The planes that the pixels around a region are on: RANSAC, one plane after the other, each refined by
+//! least squares.
 
 use crate::ambc::Random;
 use glam::{DMat3, DVec3};
 
-/// Relative error of inverse depth up to which a sample is on a plane: above the errors of search. Chosen on renderings.
+/// Relative error of inverse depth up to which a sample is on a plane: above the errors of search. Chosen on
+/// renderings.
 const TOLERANCE: f64 = 0.004;
 /// Most planes, each fitted without the samples of those before it: a region has few neighboring surfaces.
 const MAX_PLANES: usize = 5;
-/// Planes through three random samples that are tried for each: they find a plane with 20 % of the samples in more than
-/// half of all cases, one with 40 % nearly always.
+/// Planes through three random samples that are tried for each: they find a plane with 20 % of the samples in
+/// more than half of all cases, one with 40 % nearly always.
 const TRIALS: usize = 100;
 /// Most samples that a trial is evaluated on; more do not change which one wins.
 const TRIAL_SAMPLES: usize = 300;
-/// Smallest double area in square pixels of the triangle of three samples: those on a line determine no plane.
+/// Smallest double area in square pixels of the triangle of three samples: those on a line determine no
+/// plane.
 const MIN_DOUBLE_AREA: f64 = 0.5;
 /// Fewest samples of a plane: fewer are on one by chance.
 const MIN_SAMPLES: usize = 8;
@@ -44,8 +47,8 @@ impl RimSample {
     }
 }
 
-/// The planes with the most samples, by the number that the planes before left over. The random numbers depend on the
-/// region and the number of samples only.
+/// The planes with the most samples, by the number that the planes before left over. The random numbers
+/// depend on the region and the number of samples only.
 pub fn fit_rim_planes(samples: &[RimSample], region: u64) -> Vec<RimPlane> {
     let mut left = samples.to_vec();
     let mut random = Random::new(region, samples.len() as u64);

@@ -18,7 +18,8 @@ fn view<'a>(world: &'a World) -> FilteredView<'a> {
     FilteredView { camera: &world.cameras[0], image: &world.images[0], range: RANGE }
 }
 
-/// The wall in a single view; the pixels of a hole are textureless and have wrong planes that are not validated.
+/// The wall in a single view; the pixels of a hole are textureless and have wrong planes that are not
+/// validated.
 struct WallWithHole {
     world: World,
     planes: Vec<PixelEstimate>,
@@ -211,8 +212,9 @@ fn panel_gray(first: &Camera, camera: &Camera, pixel: usize) -> f32 {
     }
 }
 
-/// The panel in front of the wall, seen from these places. Its outermost pixels have validated planes, as their windows
-/// match by the wall beside them: those of the wall on three sides and those of the panel on the fourth.
+/// The panel in front of the wall, seen from these places. Its outermost pixels have validated planes, as
+/// their windows match by the wall beside them: those of the wall on three sides and those of the panel on
+/// the fourth.
 fn fill_panel(places: &[f64]) -> Vec<PixelEstimate> {
     let mut world = World::new(places, PANEL_SIZE);
     for (view, camera) in world.cameras.iter().enumerate() {
