@@ -3,10 +3,10 @@
 use super::{SourceLists, ViewRules, ViewSelector, are_occluded, faces_sources, source_lists};
 use crate::geometry::{Camera, DepthRange, SlantedPlane, ViewSets};
 use crate::image::{PackedImage, Picture};
-use crate::matching::{PatchHomography, Problem, Projections, Source, SourceProjector};
+use crate::matching::{Problem, Source};
 use crate::options::Options;
 use crate::scene::{CompactPlane, Scene, SparsePoint, View};
-use crate::simd::{LANES, Scalar, Simd, SimdLevel, Task, dispatch};
+use crate::simd::{Scalar, Simd};
 use crate::testing::{changed, looking_at};
 use glam::{DVec3, Vec3};
 
@@ -320,110 +320,4 @@ fn at_most_so_many_sources_are_taken() {
     assert_eq!(list(3).len(), 3);
     assert_eq!(list(2).len(), 2);
     assert_eq!(list(1).len(), 1);
-}
-
-/// Where a hypothesis falls in a source view that has it in its image.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Placement {
-    source: usize,
-    homography: PatchHomography,
-    x: f32,
-    y: f32,
-}
-
-/// Where the planes of a pixel fall in the sources of a set, which is taken on the way to the pixel or afterwards.
-struct Place<'a> {
-    problem: &'a Problem<'a>,
-    pixel: (f32, f32),
-    set: &'a [u32],
-    planes: &'a [SlantedPlane],
-    afterwards: bool,
-}
-
-impl Task for Place<'_> {
-    type Output = Vec<Vec<Placement>>;
-
-    fn run<S: Simd>(self, simd: S) -> Self::Output {
-        let Place { problem, pixel: (x, y), set, planes, afterwards } = self;
-        let mut projector = SourceProjector::new(simd, problem);
-        projector.set_pixel_and_views(x, y, if afterwards { &[0x3ff] } else { set });
-        if afterwards {
-            projector.set_views(set);
-        }
-        let place = |plane: &SlantedPlane| {
-            let mut found = Vec::new();
-            for group in projector.groups() {
-                let projections = group.project(simd, 1.0 / plane.inverse_depth);
-                let slopes = group.slopes(simd, plane);
-                assert_eq!(projections.inside.checked_shr(group.sources().len() as u32).unwrap_or(0), 0);
-                assert_is_within(&projections, problem, group.sources());
-                for (lane, &source) in group.sources().iter().enumerate() {
-                    if projections.inside >> lane & 1 != 0 {
-                        let (x, y) = (projections.column[lane], projections.row[lane]);
-                        found.push(Placement {
-                            source,
-                            homography: projections.homography(&slopes, lane),
-                            x,
-                            y,
-                        });
-                    }
-                }
-            }
-            found
-        };
-        planes.iter().map(place).collect()
-    }
-}
-
-/// Columns and rows are within the images also where the hypothesis is not.
-fn assert_is_within(projections: &Projections, problem: &Problem, sources: &[usize]) {
-    for lane in 0..LANES {
-        let image = sources.get(lane).map(|&source| problem.sources[source].image);
-        let (right, bottom) =
-            image.map_or((0.0, 0.0), |image| ((image.width - 1) as f32, (image.height - 1) as f32));
-        assert!((0.0..=right).contains(&projections.column[lane]), "lane {lane}: {projections:?}");
-        assert!((0.0..=bottom).contains(&projections.row[lane]), "lane {lane}: {projections:?}");
-    }
-}
-
-#[test]
-fn eight_sources_at_once_are_found_where_each_alone_is() {
-    let angles: Vec<f64> = (0..11).map(|view| f64::from(view) * 34.0 - 170.0).collect();
-    let mut views = Views::at_angles(&angles);
-    views.sources[3].cx += 15.0;
-    let mut problem = Problem::new(&views.problem, &views.image, RANGE);
-    problem.sources =
-        (views.sources.iter()).map(|camera| Source::new(&views.problem, camera, &views.image, &[])).collect();
-    let planes: Vec<SlantedPlane> = [0.001, 1.0, 2.5, 3.9, DEPTH, 4.1, 5.0, 8.0, 1e6]
-        .map(|depth| SlantedPlane { inverse_depth: 1.0 / depth, slope_x: 0.003, slope_y: -0.007 })
-        .into();
-    let (mut inside, mut outside) = (0, 0);
-    for set in [0x7ff, 0x555, 0x400, 0u32] {
-        for (x, y) in [CENTER, (0.0, 0.0), (40.0, 30.0), (7.0, 22.0)] {
-            let expected: Vec<Vec<Placement>> = (planes.iter())
-                .map(|plane| {
-                    let place = |source: usize| {
-                        let Source { pose, .. } = &problem.sources[source];
-                        // The depth goes there and back, as it does for food sources.
-                        let plane =
-                            SlantedPlane { inverse_depth: 1.0 / (1.0 / plane.inverse_depth), ..*plane };
-                        let homography = PatchHomography::of_plane(&pose, pose.at_infinity(x, y), &plane);
-                        let at = problem.sources[source].project(homography.center)?;
-                        Some(Placement { source, homography, x: at.x, y: at.y })
-                    };
-                    (0..11).filter(|source| set >> source & 1 != 0).filter_map(place).collect()
-                })
-                .collect();
-            inside += expected.iter().map(Vec::len).sum::<usize>();
-            outside += expected.iter().map(|found| set.count_ones() as usize - found.len()).sum::<usize>();
-            for level in SimdLevel::ALL.into_iter().filter(|level| level.is_available()) {
-                for afterwards in [false, true] {
-                    let (problem, pixel, set) = (&problem, (x, y), &[set][..]);
-                    let task = Place { problem, pixel, set, planes: &planes, afterwards };
-                    assert_eq!(dispatch(level, task), expected, "{}", level.name());
-                }
-            }
-        }
-    }
-    assert!(inside > 50 && outside > 50, "{inside} inside and {outside} outside");
 }
