@@ -1,8 +1,8 @@
-//! Box blur and noise at single pixels.
+//! Box blur at single pixels.
 
 use super::PackedImage;
 
-/// Mean gray value of the pixels up to `radius` columns and rows away.
+/// Mean gray value of the pixels at most `radius` columns and rows away.
 pub fn blurred(image: &PackedImage, pixel: usize, radius: usize) -> f32 {
     let (x, y) = (pixel % image.width, pixel / image.width);
     let (mut sum, mut count) = (0u32, 0u32);
@@ -13,9 +13,4 @@ pub fn blurred(image: &PackedImage, pixel: usize, radius: usize) -> f32 {
         }
     }
     sum as f32 / count as f32
-}
-
-/// Deviation of the noise at a pixel.
-pub fn deviation(image: &PackedImage, pixel: usize) -> f32 {
-    image.noise.variance(image.gray(pixel % image.width, pixel / image.width)).sqrt()
 }
