@@ -120,3 +120,33 @@ impl ViewSets {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sets_hold_any_number_of_source_views() {
+        for sources in [0, 1, 31, 32, 33, 64, 65, 70] {
+            let mut sets = ViewSets::full(3, sources);
+            assert_eq!(sets.count(1), sources);
+            assert!(sets.iter(1).eq(0..sources));
+            sets = ViewSets::empty(3, sources);
+            if let Some(last) = sources.checked_sub(1) {
+                sets.insert(1, last);
+                assert!(sets.contains(1, last) && !sets.contains(0, last) && !sets.contains(2, last));
+                assert!(sets.iter(1).eq([last]));
+            }
+            assert_eq!([0, 2].map(|pixel| sets.count(pixel)), [0, 0]);
+        }
+    }
+
+    #[test]
+    fn words_hold_eight_source_views_per_byte() {
+        let mut words = [0; 2];
+        ViewSets::insert_eight(&mut words, 5, 0b1000_0001);
+        assert!(ViewSets::iter_words(&words).eq([40, 47]));
+        assert!(ViewSets::holds(&words, 47) && !ViewSets::holds(&words, 46));
+        assert_eq!((ViewSets::eight(&words, 5), ViewSets::eight(&words, 4)), (0b1000_0001, 0));
+    }
+}

@@ -7,8 +7,7 @@ use crate::simd::{LANES, Scalar, Simd};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Pixels whose sets one parallel job selects: some hundred microseconds of work, so that scheduling costs
-/// little.
+/// Pixels per parallel job: many enough that scheduling costs little beside the work.
 const PIXELS_PER_JOB: usize = 1 << 10;
 
 /// One value per source view of a group, in memory.
@@ -148,7 +147,7 @@ pub fn select_sets(
     let mut selected = vec![0; solutions.len() * words];
     let jobs = selected.par_chunks_mut(PIXELS_PER_JOB * words).zip(solutions.par_chunks(PIXELS_PER_JOB));
     jobs.for_each(|(selected, solutions)| {
-        // Few pixels need new sets, and every back-end gives the same bits.
+        // Only filled pixels come here, and every back-end gives the same bits.
         let mut selector = ViewSelector::new(Scalar, problem, rules);
         for (set, &(pixel, depth, normal)) in selected.chunks_exact_mut(words).zip(solutions) {
             let position = ((pixel % problem.image.width) as f32, (pixel / problem.image.width) as f32);
