@@ -84,7 +84,8 @@ impl SourceLists {
         let needed = options.check.min_consistent_views as usize;
         if (1..needed).contains(&list.len()) {
             self.warnings.push(format!(
-                "{} has {} source view(s), but {needed} must agree with a depth: none of its pixels can be validated",
+                "{} has {} source view(s), but {needed} must agree with a depth: none of its pixels can be \
+                 validated",
                 view.name,
                 list.len()
             ));
@@ -101,8 +102,8 @@ fn describe_fallback(name: &str, fallback: &[(f64, u32)], options: &Options) -> 
     }
     let angles: Vec<String> = fallback.iter().map(|(angle, _)| format!("{angle:.1}")).collect();
     format!(
-        "{name} has no source view with a triangulation angle of {min} to {max} degrees; those with the nearest \
-         angles are used: {} degrees",
+        "{name} has no source view with a triangulation angle of {min} to {max} degrees; those with the \
+         nearest angles are used: {} degrees",
         angles.join(" and ")
     )
 }
