@@ -35,8 +35,8 @@ pub use options::{
     ScheduleOptions, SearchOptions, ViewSelectionOptions, WindowOptions,
 };
 pub use pipeline::{
-    Candidates, Cycle, CycleRecord, Hook, OwnMaps, Phase, Progress, Reconstruction, Stepper, Verdicts,
-    ViewEstimate, ViewResult, ignore_progress, reconstruct,
+    AnyEstimate, Candidates, Checked, Cycle, CycleRecord, EstimateRef, OwnMaps, Phase, Progress, ProgressFn,
+    Reconstruction, Searched, Stepper, ViewEstimate, ViewResult, ignore_progress, reconstruct,
 };
 pub use scene::{Maps, PixelStatus, Scene, SparsePoint, View};
 

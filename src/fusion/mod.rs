@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::image::Picture;
 use crate::options::FusionOptions;
-use crate::pipeline::{Hook, Phase, Progress};
+use crate::pipeline::{Phase, Progress, ProgressFn};
 use crate::scene::Maps;
 use crate::scene::PixelStatus;
 use average::{Member, average};
@@ -48,7 +48,7 @@ const BAND_ROWS: u32 = 32;
 /// # Errors
 /// Options out of range; a camera that makes no sense; maps or a picture of another size than their camera; an
 /// overlap that names a view there is not, the view itself or a view twice; [`Error::Cancelled`].
-pub fn fuse(views: &[FusionView], options: &FusionOptions, hook: Hook) -> Result<PointCloud> {
+pub fn fuse(views: &[FusionView], options: &FusionOptions, hook: ProgressFn) -> Result<PointCloud> {
     options.check()?;
     for index in 0..views.len() {
         check_view(views, index)?;

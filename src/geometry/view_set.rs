@@ -25,21 +25,6 @@ impl ViewSets {
         sets
     }
 
-    /// Removes the sets of all pixels and frees their memory.
-    pub(crate) fn clear(&mut self) {
-        self.bits = Vec::new();
-    }
-
-    /// Whether there are no sets, for no pixel.
-    pub(crate) fn is_clear(&self) -> bool {
-        self.bits.is_empty()
-    }
-
-    /// The sets of these pixels, in this order.
-    pub(crate) fn of(&self, pixels: impl Iterator<Item = usize>) -> ViewSets {
-        ViewSets { words: self.words, bits: pixels.flat_map(|pixel| self.words_of(pixel)).copied().collect() }
-    }
-
     /// Whether the pixel's set contains the source view with this index in the source list.
     pub fn contains(&self, pixel: usize, source: usize) -> bool {
         self.bits[pixel * self.words + source / 32] >> (source % 32) & 1 != 0

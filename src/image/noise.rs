@@ -1,6 +1,7 @@
 //! Estimation of the sensor noise of an image. A patch whose variance does not exceed it has no texture.
 
 use super::{PackedImage, Picture};
+use crate::geometry::Grid;
 use std::ops::Range;
 
 /// Gray values that share an estimate: noise depends on brightness.
@@ -70,9 +71,10 @@ impl Noise {
     }
 }
 
-/// Standard deviation of the noise at a pixel, in gray values.
+/// Standard deviation of the noise at a pixel, in gray values; 0 where it is not known.
 pub fn deviation(image: &PackedImage, pixel: usize) -> f32 {
-    image.noise.variance(image.gray(pixel % image.width, pixel / image.width)).sqrt()
+    let (x, y) = Grid { width: image.width, height: image.height }.position(pixel);
+    image.noise.variance(image.gray(x, y)).sqrt()
 }
 
 /// The quantile of the deviations at [`FLAT_FRACTION`]; 0 of none.

@@ -20,8 +20,7 @@ impl Picture {
 
 /// The mask of the camera's image at half size: set where any of the 2 x 2 pixels is set.
 pub fn halve_mask(mask: &[bool], camera: &Camera) -> Vec<bool> {
-    let fine = Grid { width: camera.width as usize, height: camera.height as usize };
-    quadruples(fine).map(|pixels| pixels.iter().any(|&pixel| mask[pixel])).collect()
+    quadruples(camera.grid()).map(|pixels| pixels.iter().any(|&pixel| mask[pixel])).collect()
 }
 
 /// For each pixel of the image at half size, row by row, the indices of its 2 x 2 pixels. The last column and

@@ -95,8 +95,8 @@ impl Workspace {
     /// A name that would lead out of the folder; a file that cannot be written.
     pub fn write_view(&self, name: &str, camera: &Camera, result: &ViewResult) -> Result<()> {
         Workspace::check_name(name)?;
-        let filtered = result.filtered();
-        self.write_maps(name, MapKind::Photometric, camera, &result.estimate, result)?;
+        let filtered = result.validated();
+        self.write_maps(name, MapKind::Photometric, camera, &result.raw, result)?;
         self.write_maps(name, MapKind::Geometric, camera, &filtered, result)?;
         let (width, height) = (camera.width, camera.height);
         write_depth_preview(&self.preview(name, "depth"), width, height, &filtered.depth)?;

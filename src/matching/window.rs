@@ -123,7 +123,7 @@ impl Window {
 
     /// The color weight of two gray values.
     #[inline(always)]
-    pub(crate) fn likeness(&self, a: u8, b: u8) -> f32 {
+    pub(crate) fn similarity(&self, a: u8, b: u8) -> f32 {
         self.color_weights[usize::from(a.abs_diff(b))]
     }
 
