@@ -1,4 +1,5 @@
-//! The search of a tile of 64 x 64 pixels, one thread: `cargo bench --bench colony`. An element is an NCC evaluation.
+//! The search in a tile of 64 x 64 pixels, on one thread: `cargo bench --bench colony`. An element is an NCC
+//! evaluation.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -10,13 +11,13 @@ use skep::{Options, Scale, Stepper, ignore_progress};
 use std::hint::black_box;
 
 fn colony(criterion: &mut Criterion) {
-    let mut made = procedural::plane_and_sphere();
-    let view = &mut made.views[MIDDLE];
+    let mut scene = procedural::plane_and_sphere();
+    let view = &mut scene.views[MIDDLE];
     let width = view.camera.width as usize;
     let is_in_tile =
         |pixel: usize| (32..96).contains(&(pixel % width)) && (16..80).contains(&(pixel / width));
     view.mask = Some((0..view.camera.pixels()).map(is_in_tile).collect());
-    let scene = made.scene();
+    let scene = scene.scene();
 
     let mut group = criterion.benchmark_group("a tile of 64 x 64 pixels");
     group.sample_size(10);

@@ -1,7 +1,8 @@
-//! How fast the kernels are on each instruction set, one thread: `cargo bench --bench kernels`.
+//! Throughput of the kernels at each SIMD level, on one thread: `cargo bench --bench kernels`.
 //!
-//! An element is a patch, or a sample where the name says samples: Melem/s are millions of NCC evaluations (samples) a
-//! second. The patches are those of a made view at its true planes, so that cache hits are those of a converged search.
+//! An element is a patch, or a sample where the name ends in samples: Melem/s are millions of NCC evaluations
+//! or samples per second. The patches are those of a procedural view at its true planes, so that cache hits
+//! are those of a converged search.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -10,17 +11,16 @@ use common::procedural::{self, MIDDLE, Procedural};
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec2;
-use skep::geometry::Camera;
-use skep::geometry::{RelativePose, SlantedPlane};
+use skep::geometry::{Camera, RelativePose, SlantedPlane};
 use skep::image::PackedImage;
 use skep::matching::{PatchHomography, ReferencePatch, Window, patch_cost, patch_costs};
 use skep::simd::{LANES, Simd, SimdLevel, Task, dispatch};
 use std::hint::black_box;
 
-/// Source views of the patches that are matched with several.
+/// Source views; the benches with one source view use the first.
 const VIEWS: [usize; 4] = [MIDDLE - 2, MIDDLE - 1, MIDDLE + 1, MIDDLE + 2];
 
-/// Pixels of the reference view with their true planes and the homographies of these to each source view.
+/// Pixels of the reference view with their true planes, and the source views.
 struct Patches {
     window: Window,
     reference: PackedImage,
@@ -32,24 +32,26 @@ struct Patches {
 struct Source {
     image: PackedImage,
     pose: RelativePose,
+    /// Homographies of the true planes, one per pixel.
     homographies: Vec<PatchHomography>,
 }
 
 impl Patches {
-    fn new(made: &Procedural, window: Window) -> Patches {
-        let view = &made.views[MIDDLE];
+    fn new(scene: &Procedural, window: Window) -> Patches {
+        let view = &scene.views[MIDDLE];
         let camera = &view.camera;
-        let wanted = |&(x, y): &(usize, usize)| x % 4 == 0 && y % 4 == 0;
+        let is_chosen = |&(x, y): &(usize, usize)| x % 4 == 0 && y % 4 == 0;
         let (width, height) = (camera.width as usize, camera.height as usize);
         let pixels: Vec<(usize, usize)> =
-            (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).filter(wanted).collect();
-        let planes: Vec<SlantedPlane> = pixels.iter().map(|&pixel| true_plane(made, camera, pixel)).collect();
+            (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).filter(is_chosen).collect();
+        let planes: Vec<SlantedPlane> =
+            pixels.iter().map(|&pixel| true_plane(scene, camera, pixel)).collect();
         let source = |view: usize| {
-            let pose = RelativePose::new(camera, &made.views[view].camera);
+            let pose = RelativePose::new(camera, &scene.views[view].camera);
             let homography = |(&(x, y), plane): (&(usize, usize), &SlantedPlane)| {
                 PatchHomography::of_plane(&pose, pose.at_infinity(x as f32, y as f32), plane)
             };
-            let image = PackedImage::new(&made.views[view].picture);
+            let image = PackedImage::new(&scene.views[view].picture);
             Source { image, pose, homographies: pixels.iter().zip(&planes).map(homography).collect() }
         };
         let sources = VIEWS.map(source).into();
@@ -57,15 +59,15 @@ impl Patches {
     }
 }
 
-fn true_plane(made: &Procedural, camera: &Camera, (x, y): (usize, usize)) -> SlantedPlane {
+fn true_plane(scene: &Procedural, camera: &Camera, (x, y): (usize, usize)) -> SlantedPlane {
     let pixel = y * camera.width as usize + x;
-    let truth = &made.truth[MIDDLE];
+    let truth = &scene.truth[MIDDLE];
     let ray = camera.ray(DVec2::new(x as f64, y as f64)).as_vec3();
     let inverse_focal = ((1.0 / camera.fx) as f32, (1.0 / camera.fy) as f32);
     SlantedPlane::new(truth.depth[pixel], truth.normal[pixel].into(), ray, inverse_focal)
 }
 
-/// Samples the reference's side of every patch.
+/// Samples the reference side of every patch.
 struct Sample<'a>(&'a Patches);
 
 impl Task for Sample<'_> {
@@ -87,14 +89,14 @@ impl Task for Sample<'_> {
     }
 }
 
-/// Compares one sampled patch with what every plane makes of it in the first source view: homography and NCC.
-struct Compare<'a>(&'a Patches, &'a ReferencePatch);
+/// Matches one sampled patch in the first source view, by the true plane of every pixel: homography and NCC.
+struct Match<'a>(&'a Patches, &'a ReferencePatch);
 
-impl Task for Compare<'_> {
+impl Task for Match<'_> {
     type Output = f32;
 
     fn run<S: Simd>(self, simd: S) -> f32 {
-        let Compare(Patches { window, pixels, planes, sources, .. }, patch) = self;
+        let Match(Patches { window, pixels, planes, sources, .. }, patch) = self;
         let Source { image, pose, .. } = &sources[0];
         simd.vectorize(
             #[inline(always)]
@@ -102,7 +104,7 @@ impl Task for Compare<'_> {
                 let mut sum = 0.0;
                 for (&(x, y), plane) in pixels.iter().zip(planes) {
                     let homography =
-                        PatchHomography::of_plane(&pose, pose.at_infinity(x as f32, y as f32), plane);
+                        PatchHomography::of_plane(pose, pose.at_infinity(x as f32, y as f32), plane);
                     sum += patch_cost(simd, window, patch, image, &homography);
                 }
                 sum
@@ -111,10 +113,10 @@ impl Task for Compare<'_> {
     }
 }
 
-/// Samples each patch of the reference and compares it with all source views.
-struct CompareViews<'a>(&'a Patches);
+/// Samples each patch of the reference view and matches it in all source views.
+struct MatchViews<'a>(&'a Patches);
 
-impl Task for CompareViews<'_> {
+impl Task for MatchViews<'_> {
     type Output = f32;
 
     fn run<S: Simd>(self, simd: S) -> f32 {
@@ -128,7 +130,7 @@ impl Task for CompareViews<'_> {
                     patch.sample(simd, window, reference, x, y);
                     let view = |index: usize| {
                         let Source { image, pose, .. } = &sources[index];
-                        (image, PatchHomography::of_plane(&pose, pose.at_infinity(x as f32, y as f32), plane))
+                        (image, PatchHomography::of_plane(pose, pose.at_infinity(x as f32, y as f32), plane))
                     };
                     sum += patch_costs(simd, window, &patch, view, 0b1111)[0];
                 }
@@ -138,7 +140,7 @@ impl Task for CompareViews<'_> {
     }
 }
 
-/// The homographies alone.
+/// Computes the homographies alone.
 struct Homographies<'a>(&'a Patches);
 
 impl Task for Homographies<'_> {
@@ -151,27 +153,27 @@ impl Task for Homographies<'_> {
             #[inline(always)]
             || {
                 for (&(x, y), plane) in pixels.iter().zip(planes) {
-                    black_box(PatchHomography::of_plane(&pose, pose.at_infinity(x as f32, y as f32), plane));
+                    black_box(PatchHomography::of_plane(pose, pose.at_infinity(x as f32, y as f32), plane));
                 }
             },
         );
     }
 }
 
-/// Nothing but the bytes that [`Compare`] reads, from addresses worked out before: the machine's limit.
+/// Loads the taps of [`Match`] at precomputed indices, and does nothing else: a lower bound of its time.
 struct Gather<'a>(&'a PackedImage, &'a [[u32; LANES]]);
 
 impl Task for Gather<'_> {
     type Output = [u32; LANES];
 
     fn run<S: Simd>(self, simd: S) -> [u32; LANES] {
-        let Gather(image, places) = self;
+        let Gather(image, indices) = self;
         simd.vectorize(
             #[inline(always)]
             || {
                 let mut sums = [0u32; LANES];
-                for places in places {
-                    let taps = simd.gather(&image.taps, places);
+                for indices in indices {
+                    let taps = simd.gather(&image.taps, indices);
                     for (sum, tap) in sums.iter_mut().zip(taps) {
                         *sum = sum.wrapping_add(tap);
                     }
@@ -182,25 +184,25 @@ impl Task for Gather<'_> {
     }
 }
 
-/// Where the 36 samples of every patch fall in the first source view, eight a vector, the last one filled up.
-fn places(patches: &Patches) -> Vec<[u32; LANES]> {
+/// Indices of the pairs under the 36 samples of every patch in the first source view, eight per vector; the
+/// last vector repeats a sample.
+fn pair_indices(patches: &Patches) -> Vec<[u32; LANES]> {
     let Source { image, homographies, .. } = &patches.sources[0];
     let offsets: Vec<(f32, f32)> =
         (-5..=5).step_by(2).flat_map(|y| (-5..=5).step_by(2).map(move |x| (x as f32, y as f32))).collect();
-    let mut places = Vec::new();
+    let mut indices = Vec::new();
     for PatchHomography { center, along_x, along_y } in homographies {
         for eight in offsets.chunks(LANES) {
-            places.push(std::array::from_fn(|lane| {
+            indices.push(std::array::from_fn(|lane| {
                 let (dx, dy) = eight[lane.min(eight.len() - 1)];
                 let point = *center + dx * *along_x + dy * *along_y;
-                let inside = |at: f32, size: usize| at.clamp(0.0, (size - 1) as f32) as usize;
-                let (x, y) =
-                    (inside(point.x / point.z, image.width), inside(point.y / point.z, image.height));
+                let clamp = |at: f32, size: usize| at.clamp(0.0, (size - 1) as f32) as usize;
+                let (x, y) = (clamp(point.x / point.z, image.width), clamp(point.y / point.z, image.height));
                 (y * image.taps.stride() + x) as u32
             }));
         }
     }
-    places
+    indices
 }
 
 fn on_every_level(group: &mut BenchmarkGroup<WallTime>, mut run: impl FnMut(SimdLevel)) {
@@ -210,7 +212,7 @@ fn on_every_level(group: &mut BenchmarkGroup<WallTime>, mut run: impl FnMut(Simd
 }
 
 fn kernels(criterion: &mut Criterion) {
-    let made = procedural::plane_and_sphere();
+    let scene = procedural::plane_and_sphere();
     let mut group_of = |name: &str, elements: usize, run: &mut dyn FnMut(SimdLevel)| {
         let mut group = criterion.benchmark_group(name);
         group.throughput(Throughput::Elements(elements as u64));
@@ -223,24 +225,24 @@ fn kernels(criterion: &mut Criterion) {
         ("121 samples", Window::new(5, 1, 3.0, 0.03, 1e-5)),
     ];
     for (name, window) in windows {
-        let patches = Patches::new(&made, window);
+        let patches = Patches::new(&scene, window);
         let sampled = dispatch(SimdLevel::Scalar, Sample(&patches));
         let count = patches.pixels.len();
         group_of(&format!("homography and NCC of a patch, {name}"), count, &mut |level| {
-            black_box(dispatch(level, Compare(&patches, black_box(&sampled))));
+            black_box(dispatch(level, Match(&patches, black_box(&sampled))));
         });
         group_of(&format!("a pixel with 4 source views, {name}"), count * VIEWS.len(), &mut |level| {
-            black_box(dispatch(level, CompareViews(black_box(&patches))));
+            black_box(dispatch(level, MatchViews(black_box(&patches))));
         });
         group_of(&format!("reference side of a patch, {name}"), count, &mut |level| {
             black_box(dispatch(level, Sample(black_box(&patches))));
         });
     }
-    let patches = Patches::new(&made, Window::new(5, 2, 3.0, 0.03, 1e-5));
+    let patches = Patches::new(&scene, Window::new(5, 2, 3.0, 0.03, 1e-5));
     let count = patches.pixels.len();
-    let places = places(&patches);
-    group_of("reading the taps of 36-sample patches, samples", 36 * count, &mut |level| {
-        black_box(dispatch(level, Gather(&patches.sources[0].image, black_box(&places))));
+    let indices = pair_indices(&patches);
+    group_of("loading the taps of 36-sample patches, samples", 36 * count, &mut |level| {
+        black_box(dispatch(level, Gather(&patches.sources[0].image, black_box(&indices))));
     });
     group_of("homography alone", count, &mut |level| {
         dispatch(level, Homographies(black_box(&patches)));

@@ -1,20 +1,19 @@
-//! Planes and the homographies they induce, held against the projection of the plane's points.
+//! Planes and the homographies they induce, against the projections of the plane's points.
 
 use glam::{DMat3, DQuat, DVec2, DVec3, EulerRot, Vec3};
 use proptest::prelude::*;
-use skep::geometry::{Camera, Plane, plane_homography};
-use skep::geometry::{RelativePose, SlantedPlane};
+use skep::geometry::{Camera, Plane, RelativePose, SlantedPlane, plane_homography};
 use skep::matching::PatchHomography;
 
 const WIDTH: u32 = 640;
 const HEIGHT: u32 = 480;
 
-/// In pixels. Homogeneous coordinates of some thousand in f32, divided by a third coordinate that [`Case::target`] keeps
-/// above 0.2, are off by some thousandths.
+/// Tolerance of f32 projections, in px: homogeneous coordinates of some thousands, divided by a third
+/// coordinate that [`Case::target`] keeps above 0.2, have errors of some thousandths.
 const F32_PIXELS: f64 = 0.01;
 
 prop_compose! {
-    /// A camera near `(0, 0, -4)` that looks roughly along z.
+    /// A camera near (0, 0, -4) that looks approximately along z.
     fn camera()(
         focal in prop::array::uniform2(300.0..900.0f64),
         principal in prop::array::uniform2(0.3..0.7f64),
@@ -51,7 +50,7 @@ prop_compose! {
     fn case()(
         reference in camera(),
         source in camera(),
-        // Whole pixels, which f32 holds exactly.
+        // Integers, exact in f32.
         pixel in (0..WIDTH, 0..HEIGHT),
         offset in (-8..=8i32, -8..=8i32),
         depth in 2.0..8.0f64,
@@ -75,7 +74,8 @@ impl Case {
         SlantedPlane::new(self.depth as f32, self.normal.as_vec3(), ray, inverse_focal)
     }
 
-    /// Where the plane's point behind `pixel` falls in the source, `None` when that lies beside or behind its camera.
+    /// The projection of the plane's point at `pixel` into the source; `None` far outside its image or behind
+    /// its camera.
     fn target(&self, pixel: DVec2) -> Option<DVec2> {
         let depth = self.plane().depth(&self.reference, pixel);
         let (target, source_depth) = self.source.project(self.reference.unproject(pixel, depth))?;
@@ -83,17 +83,17 @@ impl Case {
     }
 }
 
-fn dehomogenise(point: DVec3) -> DVec2 {
+fn dehomogenize(point: DVec3) -> DVec2 {
     point.truncate() / point.z
 }
 
 fn distance_of(point: Vec3, target: DVec2) -> f64 {
-    dehomogenise(point.as_dvec3()).distance(target)
+    dehomogenize(point.as_dvec3()).distance(target)
 }
 
 proptest! {
     #[test]
-    fn a_plane_has_its_depth_where_it_was_put_and_its_points_elsewhere(case in case()) {
+    fn planes_go_through_their_point_and_depths_lie_on_them(case in case()) {
         let (camera, plane) = (&case.reference, case.plane());
         prop_assert!(plane.distance > 0.0);
         prop_assert!((plane.depth(camera, case.pixel) - case.depth).abs() < 1e-9);
@@ -103,11 +103,11 @@ proptest! {
     }
 
     #[test]
-    fn the_homography_takes_pixels_where_the_plane_s_points_project(case in case()) {
+    fn plane_homographies_map_pixels_to_projections_of_the_plane(case in case()) {
         let elsewhere = case.pixel + case.offset;
         let Some(target) = case.target(elsewhere) else { return Ok(()) };
         let homography = plane_homography(&case.reference, &case.source, &case.plane());
-        let mapped = dehomogenise(homography * elsewhere.extend(1.0));
+        let mapped = dehomogenize(homography * elsewhere.extend(1.0));
         prop_assert!(mapped.distance(target) < 1e-6, "{mapped} instead of {target}");
     }
 
@@ -120,7 +120,7 @@ proptest! {
     }
 
     #[test]
-    fn a_point_at_a_depth_projects_the_same_way_in_the_kernels(case in case()) {
+    fn relative_poses_project_points_like_cameras(case in case()) {
         let Some(target) = case.target(case.pixel) else { return Ok(()) };
         let pose = RelativePose::new(&case.reference, &case.source);
         let at_infinity = pose.at_infinity(case.pixel.x as f32, case.pixel.y as f32);
@@ -131,7 +131,7 @@ proptest! {
     }
 
     #[test]
-    fn the_homography_about_a_pixel_takes_its_neighbors_where_they_project(case in case()) {
+    fn patch_homographies_map_offsets_to_projections_of_the_plane(case in case()) {
         let Some(target) = case.target(case.pixel + case.offset) else { return Ok(()) };
         let pose = RelativePose::new(&case.reference, &case.source);
         let at_infinity = pose.at_infinity(case.pixel.x as f32, case.pixel.y as f32);
@@ -154,11 +154,11 @@ proptest! {
         prop_assert!((near.epipole - far.epipole).length() <= 1e-6 * near.epipole.length().max(1.0));
         let Some(target) = case.target(case.pixel) else { return Ok(()) };
         let homography = plane_homography(&reference, &source, &case.plane());
-        prop_assert!(dehomogenise(homography * case.pixel.extend(1.0)).distance(target) < 1e-4);
+        prop_assert!(dehomogenize(homography * case.pixel.extend(1.0)).distance(target) < 1e-4);
     }
 
     #[test]
-    fn halving_puts_the_center_of_a_coarse_pixel_between_four_fine_ones(
+    fn centers_of_coarse_pixels_lie_between_four_fine_pixels(
         camera in camera(),
         pixel in prop::array::uniform2(0.0..400.0f64),
         depth in 1.0..9.0f64,
@@ -171,7 +171,7 @@ proptest! {
 }
 
 #[test]
-fn an_odd_side_is_rounded_up_when_halved() {
+fn halved_cameras_round_odd_sides_up() {
     let camera = Camera {
         width: 7,
         height: 1,
@@ -188,7 +188,7 @@ fn an_odd_side_is_rounded_up_when_halved() {
 }
 
 #[test]
-fn nothing_projects_from_behind_the_camera_and_pixels_end_half_a_pixel_beyond_their_center() {
+fn points_behind_the_camera_and_outside_the_image_have_no_pixel() {
     let camera = Camera {
         width: 4,
         height: 3,

@@ -1,4 +1,4 @@
-//! The patch cost of every back-end against a bilaterally weighted NCC written plainly in f64.
+//! The patch cost of every back-end against a direct computation of the bilaterally weighted NCC in f64.
 
 use glam::Vec3;
 use proptest::prelude::*;
@@ -9,15 +9,15 @@ use skep::simd::{Simd, SimdLevel, Task, dispatch};
 const WIDTH: u32 = 24;
 const HEIGHT: u32 = 18;
 
-/// The window of the tests: its half side is odd and the step even, so that the center is no sample.
+/// The window of the tests. With an odd radius and an even step the center is not a sample.
 const RADIUS: i32 = 5;
 const STEP: usize = 2;
-const SPATIAL_SIGMA: f64 = 4.0;
-const COLOR_SIGMA: f64 = 0.2;
+const SIGMA_SPATIAL: f64 = 4.0;
+const SIGMA_COLOR: f64 = 0.2;
 const MIN_VARIANCE: f64 = 1e-5;
 
 fn window() -> Window {
-    Window::new(RADIUS as u32, STEP as u32, SPATIAL_SIGMA, COLOR_SIGMA, MIN_VARIANCE)
+    Window::new(RADIUS as u32, STEP as u32, SIGMA_SPATIAL, SIGMA_COLOR, MIN_VARIANCE)
 }
 
 fn picture(gray: impl Fn(i32, i32) -> u8) -> Picture {
@@ -25,13 +25,13 @@ fn picture(gray: impl Fn(i32, i32) -> u8) -> Picture {
     Picture::from_gray(WIDTH, HEIGHT, pixels.map(|(x, y)| gray(x, y)).collect()).unwrap()
 }
 
-/// Takes every pixel to the one at an offset.
-fn shift((x, y): (usize, usize), (dx, dy): (f32, f32)) -> PatchHomography {
+/// The homography that translates by an offset.
+fn translation((x, y): (usize, usize), (dx, dy): (f32, f32)) -> PatchHomography {
     let center = Vec3::new(x as f32 + dx, y as f32 + dy, 1.0);
     PatchHomography { center, along_x: Vec3::X, along_y: Vec3::Y }
 }
 
-/// What is compared with what.
+/// One patch cost: images, reference pixel and homography.
 #[derive(Debug, Clone)]
 struct Case {
     reference: Picture,
@@ -55,7 +55,7 @@ impl Task for Cost<'_> {
             || {
                 patch.sample(simd, &window, &reference, *x, *y);
                 let cost = patch_cost(simd, &window, &patch, &source, homography);
-                // Beside others, in any lane, it is the same.
+                // `patch_costs` gives the same bits, in any lane and with any other views.
                 let other = PatchHomography { center: homography.center + Vec3::X, ..*homography };
                 for (lane, wanted) in [(0, 0b1), (2, 0b1_1111), (3, 0b1010_1010), (7, u8::MAX)] {
                     let view = |index| {
@@ -75,10 +75,10 @@ impl Task for Cost<'_> {
 
 impl Case {
     fn new(reference: Picture, source: Picture, pixel: (usize, usize), offset: (f32, f32)) -> Case {
-        Case { reference, source, pixel, homography: shift(pixel, offset) }
+        Case { reference, source, pixel, homography: translation(pixel, offset) }
     }
 
-    /// The cost, which must be the same bits on all back-ends.
+    /// The cost; asserts that it has the same bits on all back-ends.
     fn cost(&self) -> f32 {
         let cost = dispatch(SimdLevel::Scalar, Cost(self));
         for level in SimdLevel::ALL.into_iter().filter(|level| level.is_available()) {
@@ -93,45 +93,47 @@ fn gray_at(picture: &Picture, x: usize, y: usize) -> f64 {
     f64::from(picture.gray()[y * picture.width() as usize + x])
 }
 
-/// At a place whose fractions are those of [`in_parts`].
+/// A bilinear sample at a position given by [`quantized`].
 fn bilinear(picture: &Picture, x: f64, y: f64) -> f64 {
     let (column, row) = (x as usize, y as usize);
     let (right, below) =
         ((column + 1).min(picture.width() as usize - 1), (row + 1).min(picture.height() as usize - 1));
     let (fx, fy) = (x.fract(), y.fract());
     let top = gray_at(picture, column, row) * (1.0 - fx) + gray_at(picture, right, row) * fx;
-    let low = gray_at(picture, column, below) * (1.0 - fx) + gray_at(picture, right, below) * fx;
-    top * (1.0 - fy) + low * fy
+    let bottom = gray_at(picture, column, below) * (1.0 - fx) + gray_at(picture, right, below) * fx;
+    top * (1.0 - fy) + bottom * fy
 }
 
-/// The place between two pixels that samples are taken at: of 256 parts, the first is one pixel and the last the other.
-fn in_parts(at: f64) -> f64 {
-    at.floor() + (at.fract() * 256.0).floor() / 255.0
+/// The coordinate truncated to 1/256 px, with the weights of the kernels: a fraction of f / 256 weighs f /
+/// 255.
+fn quantized(coordinate: f64) -> f64 {
+    coordinate.floor() + (coordinate.fract() * 256.0).floor() / 255.0
 }
 
-/// A coordinate brought into the image, and how far f32 may be off there: some ulp of what it is summed from, divided by
-/// the third coordinate; nothing where both ends of that interval lie beyond the same border.
+/// A coordinate clamped to the image, and its possible error in f32: some ulp of the terms it is the sum of,
+/// divided by the third coordinate; 0 where both ends of that interval lie beyond the same border.
 fn clamped(terms: [f64; 3], z_terms: [f64; 3], last: u32) -> (f64, f64) {
     let magnitude = |terms: [f64; 3]| terms.iter().map(|term| term.abs()).sum::<f64>();
     let ulps = 6.0 * f64::from(f32::EPSILON);
     let (sum, z): (f64, f64) = (terms.iter().sum(), z_terms.iter().sum());
-    let at = sum / z;
-    let inside = |at: f64| in_parts(at.max(0.0).min(f64::from(last)));
+    let coordinate = sum / z;
+    let clamp = |coordinate: f64| quantized(coordinate.max(0.0).min(f64::from(last)));
     if z.abs() <= ulps * magnitude(z_terms) {
-        return (inside(at), f64::from(last));
+        return (clamp(coordinate), f64::from(last));
     }
-    let error = ulps * (magnitude(terms) + at.abs() * magnitude(z_terms)) / z.abs();
-    (inside(at), inside(at + error) - inside(at - error))
+    let error = ulps * (magnitude(terms) + coordinate.abs() * magnitude(z_terms)) / z.abs();
+    (clamp(coordinate), clamp(coordinate + error) - clamp(coordinate - error))
 }
 
 struct Direct {
     cost: f64,
+    /// Possible error of an f32 computation of the cost.
     tolerance: f64,
-    /// Of reference and source, in squared intensities.
+    /// Variances of reference and source, in squared intensities.
     variances: [f64; 2],
 }
 
-/// The definition: weights from the reference, means, variances and covariance under them.
+/// The textbook NCC in f64: weights from the reference, weighted means, variances and covariance.
 fn direct(case: &Case) -> Direct {
     let Case { reference, source, pixel: (x, y), homography } = case;
     let center = gray_at(reference, *x, *y) / 255.0;
@@ -151,10 +153,10 @@ fn direct(case: &Case) -> Direct {
 
             let a = gray_at(reference, column as usize, row as usize) / 255.0;
             let b = bilinear(source, source_x, source_y) / 255.0;
-            let space = (dx * dx + dy * dy) / (2.0 * SPATIAL_SIGMA * SPATIAL_SIGMA);
-            let color = (a - center).powi(2) / (2.0 * COLOR_SIGMA * COLOR_SIGMA);
+            let space = (dx * dx + dy * dy) / (2.0 * SIGMA_SPATIAL * SIGMA_SPATIAL);
+            let color = (a - center).powi(2) / (2.0 * SIGMA_COLOR * SIGMA_COLOR);
             samples.push(((-space - color).exp(), a, b));
-            // Gray changes by at most its whole range from one pixel to the next.
+            // Intensities change by at most 1 from one pixel to the next.
             errors.push((error_x + error_y).min(1.0));
         }
     }
@@ -166,8 +168,9 @@ fn direct(case: &Case) -> Direct {
     let covariance = mean(&|s| (s.1 - mean_a) * (s.2 - mean_b));
     let textured = variances.iter().all(|&variance| variance >= MIN_VARIANCE);
     let ncc = covariance / (variances[0] * variances[1]).sqrt();
-    // An error of the source's samples changes the correlation by at most twice its deviation over theirs. Beyond that
-    // there are the roundings of single-pass sums, whose terms exceed the variance by the squared difference of means.
+    // An error of the source samples changes the correlation by at most twice the ratio of its deviation to
+    // theirs. To it comes the rounding of single-pass sums, whose terms exceed the variance by the squared
+    // difference of the means.
     let squares: f64 = samples.iter().zip(&errors).map(|(s, error)| s.0 / total * error * error).sum();
     let deviation = variances[1].sqrt().max(1e-9);
     let single_pass = 1e-5 * (1.0 + (mean_a - mean_b).powi(2) / variances[1].max(1e-9));
@@ -178,7 +181,7 @@ fn direct(case: &Case) -> Direct {
     }
 }
 
-/// Noise of some contrast around some gray.
+/// Uniform noise between two gray values.
 fn noise() -> impl Strategy<Value = Picture> {
     let values = prop::collection::vec(0.0..1.0f64, (WIDTH * HEIGHT) as usize);
     (values, 0.0..255.0f64, 0.0..255.0f64).prop_map(|(values, a, b)| {
@@ -188,7 +191,8 @@ fn noise() -> impl Strategy<Value = Picture> {
 }
 
 prop_compose! {
-    /// Homographies of all kinds: near the identity, strongly slanted, out of the image, behind the camera.
+    /// Homographies of all kinds: near the identity, at grazing incidence, outside the image, behind the
+    /// camera.
     fn homography()(
         center in (-10.0..34.0f32, -10.0..28.0f32),
         along_x in prop::array::uniform2(-1.5..1.5f32),
@@ -217,20 +221,20 @@ prop_compose! {
 
 proptest! {
     #[test]
-    fn the_cost_is_the_definition_s_on_every_back_end(case in case()) {
+    fn every_back_end_computes_the_textbook_cost(case in case()) {
         let cost = f64::from(case.cost());
         prop_assert!((0.0..=2.0).contains(&cost), "cost {}", cost);
         let direct = direct(&case);
-        // On the threshold either side may be right.
-        let is_clear = direct.variances.iter().all(|variance| (variance / MIN_VARIANCE - 1.0).abs() > 0.05);
-        if is_clear && direct.tolerance < 0.05 {
+        // Near the threshold either result is correct.
+        let is_off_threshold = |variance: &f64| (variance / MIN_VARIANCE - 1.0).abs() > 0.05;
+        if direct.variances.iter().all(is_off_threshold) && direct.tolerance < 0.05 {
             let difference = (cost - direct.cost).abs();
             prop_assert!(difference <= direct.tolerance, "{} instead of {}", cost, direct.cost);
         }
     }
 
     #[test]
-    fn a_patch_matches_itself_and_is_the_opposite_of_its_negative(
+    fn a_patch_costs_0_with_itself_and_2_with_its_negative(
         reference in noise(),
         x in 0..WIDTH as usize,
         y in 0..HEIGHT as usize,
@@ -245,13 +249,13 @@ proptest! {
     }
 }
 
-/// Pixels that look random, in steps of four gray values so that half of it is exact.
+/// Pseudo-random gray values, multiples of 4 so that halves are exact.
 fn texture(x: i32, y: i32) -> u8 {
     ((x * 7919 + y * 104_729 + x * y * 31) % 61).unsigned_abs() as u8 * 4
 }
 
 #[test]
-fn most_of_the_random_cases_are_held_against_the_definition() {
+fn most_random_cases_have_a_small_tolerance() {
     use proptest::strategy::ValueTree;
     use proptest::test_runner::TestRunner;
     let mut runner = TestRunner::deterministic();
@@ -262,7 +266,7 @@ fn most_of_the_random_cases_are_held_against_the_definition() {
 }
 
 #[test]
-fn brightness_and_contrast_do_not_matter() {
+fn cost_is_invariant_to_brightness_and_contrast() {
     let reference = picture(texture);
     let darker = picture(|x, y| texture(x, y) / 2 + 40);
     assert!(Case::new(reference.clone(), darker.clone(), (12, 9), (0.0, 0.0)).cost() < 1e-5);
@@ -270,37 +274,37 @@ fn brightness_and_contrast_do_not_matter() {
 }
 
 #[test]
-fn the_shift_of_a_picture_is_found_also_at_borders() {
+fn the_true_translation_costs_least_also_at_borders() {
     let reference = picture(texture);
     for (pixel, (dx, dy)) in [((12, 9), (3, -2)), ((0, 8), (3, -2)), ((12, 17), (-3, -2)), ((23, 0), (-3, 2))]
     {
         let moved = picture(|x, y| texture(x - dx, y - dy));
         let cost = |dx, dy| Case::new(reference.clone(), moved.clone(), pixel, (dx, dy)).cost();
-        let (right, wrong) = (cost(dx as f32, dy as f32), cost(0.0, 0.0));
-        assert!(right < 1e-5 && wrong > 0.02, "{pixel:?}: {right} and {wrong}");
+        let (moved, unmoved) = (cost(dx as f32, dy as f32), cost(0.0, 0.0));
+        assert!(moved < 1e-5 && unmoved > 0.02, "{pixel:?}: {moved} and {unmoved}");
     }
 }
 
 #[test]
-fn half_way_between_pixels_there_is_their_mean() {
+fn samples_half_way_between_pixels_are_their_mean() {
     let reference = picture(|x, y| ((texture(x, y) / 4) + (texture(x + 1, y) / 4)) * 2);
     let source = picture(texture);
     assert!(Case::new(reference, source, (12, 9), (0.5, 0.0)).cost() < 1e-5);
 }
 
 #[test]
-fn without_texture_on_either_side_there_is_nothing_to_compare() {
+fn patches_without_texture_cost_the_maximum() {
     let (flat, textured) = (picture(|_, _| 90), picture(texture));
     assert_eq!(Case::new(flat.clone(), textured.clone(), (12, 9), (0.0, 0.0)).cost(), MAX_COST);
     assert_eq!(Case::new(textured.clone(), flat.clone(), (12, 9), (0.0, 0.0)).cost(), MAX_COST);
     assert_eq!(Case::new(flat.clone(), flat, (12, 9), (0.0, 0.0)).cost(), MAX_COST);
-    // All samples fall on one corner, beyond the border that repeats.
+    // All samples are clamped to one corner pixel.
     assert_eq!(Case::new(textured.clone(), textured, (12, 9), (1000.0, 1000.0)).cost(), MAX_COST);
 }
 
 #[test]
-fn a_gray_value_of_noise_is_no_texture_and_four_are() {
-    // Stripes two pixels wide, which a window with step 2 sees in turn.
+fn stripes_of_one_gray_value_are_no_texture_and_of_four_are() {
+    // Stripes two pixels wide: a window with step 2 samples them in turn.
     let stripes = |height: u8| picture(move |x, _| 100 + height * (x / 2 % 2) as u8);
     let cost = |height| Case::new(stripes(height), stripes(height), (12, 9), (0.0, 0.0)).cost();
     assert_eq!(cost(1), MAX_COST);
@@ -308,7 +312,7 @@ fn a_gray_value_of_noise_is_no_texture_and_four_are() {
 }
 
 #[test]
-fn what_is_not_a_number_costs_the_most() {
+fn degenerate_homographies_cost_the_maximum() {
     let textured = picture(texture);
     for center in [Vec3::NAN, Vec3::ZERO, Vec3::INFINITY] {
         let homography = PatchHomography { center, along_x: Vec3::ZERO, along_y: Vec3::ZERO };
@@ -318,24 +322,24 @@ fn what_is_not_a_number_costs_the_most() {
 }
 
 #[test]
-fn images_smaller_than_the_window_are_sampled_inside() {
+fn images_smaller_than_the_window_are_matched() {
     for (width, height) in [(1, 1), (1, 9), (9, 1), (2, 3)] {
         let gray: Vec<u8> = (0..width * height).map(|pixel| (pixel * 53 % 200) as u8).collect();
         let tiny = Picture::from_gray(width, height, gray).unwrap();
         for pixel in 0..(width * height) as usize {
-            let at = (pixel % width as usize, pixel / width as usize);
-            let cost = Case::new(tiny.clone(), tiny.clone(), at, (0.0, 0.0)).cost();
-            assert!((0.0..1e-5).contains(&cost) || cost == MAX_COST, "{width}x{height} at {at:?}: {cost}");
+            let position = (pixel % width as usize, pixel / width as usize);
+            let cost = Case::new(tiny.clone(), tiny.clone(), position, (0.0, 0.0)).cost();
+            assert!((0.0..1e-5).contains(&cost) || cost == MAX_COST, "{width}x{height} {position:?}: {cost}");
         }
     }
 }
 
 #[test]
-fn a_window_counts_its_samples() {
+fn windows_report_the_number_of_their_samples() {
     assert_eq!(window().samples(), 36);
     assert_eq!(Window::new(5, 1, 5.0, 0.2, 1e-5).samples(), 121);
     assert_eq!(Window::new(1, 3, 5.0, 0.2, 1e-5).samples(), 1);
-    // Without three samples in each corner; without the corners at a distance of 2.8 and more.
+    // Without three samples in each corner, and without the corners alone.
     assert_eq!(Window::disc(5, 2, 5.0, 0.2, 1e-5).samples(), 24);
     assert_eq!(Window::disc(2, 1, 5.0, 0.2, 1e-5).samples(), 21);
 }

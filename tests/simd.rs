@@ -1,16 +1,16 @@
-//! Every back-end's operations against the scalar ones: the same bits.
+//! The operations of every back-end against the scalar ones: the results must have the same bits.
 
 use proptest::prelude::*;
 use skep::simd::{LANES, SAMPLE_SCALE, Scalar, Simd, SimdLevel, Taps, Task, dispatch};
 
 type Lanes = [f32; LANES];
 
-/// The back-ends of this machine.
+/// The levels that this CPU supports.
 fn levels() -> impl Iterator<Item = SimdLevel> {
     SimdLevel::ALL.into_iter().filter(|level| level.is_available())
 }
 
-/// An operation written once for all back-ends.
+/// An operation, generic over the back-end.
 trait Operation: Copy {
     fn run<S: Simd>(self, simd: S) -> Vec<Lanes>;
 }
@@ -25,7 +25,7 @@ impl<O: Operation> Task for Vectorized<O> {
     }
 }
 
-/// The bits, with one pattern for all that is not a number: which one is left open.
+/// The bits of all lanes; every NaN has the same, since its payload is unspecified.
 fn bits(lanes: &[Lanes]) -> Vec<u32> {
     let bits = |lane: &f32| if lane.is_nan() { f32::NAN.to_bits() } else { lane.to_bits() };
     lanes.iter().flatten().map(bits).collect()
@@ -75,31 +75,31 @@ impl Operation for Arithmetic {
 }
 
 #[derive(Clone, Copy)]
-struct Whole(Lanes);
+struct Trunc(Lanes);
 
-impl Operation for Whole {
+impl Operation for Trunc {
     fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
         vec![simd.store(simd.trunc(simd.load(&self.0)))]
     }
 }
 
 #[derive(Clone, Copy)]
-struct Largest(Lanes);
+struct ReduceMax(Lanes);
 
-impl Operation for Largest {
+impl Operation for ReduceMax {
     fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
         vec![[simd.reduce_max(simd.load(&self.0)); LANES]]
     }
 }
 
 #[derive(Clone, Copy)]
-struct Places<'a>(&'a [i32; LANES], Lanes, Lanes);
+struct LinearIndices<'a>(&'a [i32; LANES], Lanes, Lanes);
 
-impl Operation for Places<'_> {
+impl Operation for LinearIndices<'_> {
     fn run<S: Simd>(self, simd: S) -> Vec<Lanes> {
-        let places = simd.linear_indices(self.0, simd.load(&self.1), simd.load(&self.2));
-        // Their bits: f32 does not hold every u32.
-        vec![places.map(f32::from_bits)]
+        let indices = simd.linear_indices(self.0, simd.load(&self.1), simd.load(&self.2));
+        // As bits: not every u32 is exact in f32.
+        vec![indices.map(f32::from_bits)]
     }
 }
 
@@ -125,7 +125,7 @@ impl Operation for Gather<'_> {
     }
 }
 
-/// Any f32, with the special ones often.
+/// Any f32; special values are frequent.
 fn any_lane() -> impl Strategy<Value = f32> {
     let special = [0.0, -0.0, 1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MIN_POSITIVE, f32::MAX];
     prop_oneof![any::<f32>(), -300.0..300.0f32, prop::sample::select(special.to_vec())]
@@ -135,7 +135,7 @@ fn any_lanes() -> impl Strategy<Value = Lanes> {
     prop::array::uniform8(any_lane())
 }
 
-fn whole_lanes(below: u32) -> impl Strategy<Value = Lanes> {
+fn integral_lanes(below: u32) -> impl Strategy<Value = Lanes> {
     prop::array::uniform8((0..below).prop_map(|lane| lane as f32))
 }
 
@@ -150,7 +150,7 @@ prop_compose! {
 }
 
 #[test]
-fn eight_sums_stand_in_the_order_of_their_vectors() {
+fn reduce_sum_8x8_keeps_the_order_of_the_vectors() {
     #[derive(Clone, Copy)]
     struct Sums;
     impl Operation for Sums {
@@ -170,32 +170,32 @@ proptest! {
     }
 
     #[test]
-    fn whole_parts_give_the_same_bits(lanes in prop::array::uniform8(0.0..16_777_215.0f32)) {
-        check(Whole(lanes))?;
-        prop_assert_eq!(Whole(lanes).run(Scalar), vec![lanes.map(f32::trunc)]);
+    fn trunc_gives_the_same_bits(lanes in prop::array::uniform8(0.0..16_777_215.0f32)) {
+        check(Trunc(lanes))?;
+        prop_assert_eq!(Trunc(lanes).run(Scalar), vec![lanes.map(f32::trunc)]);
     }
 
     #[test]
-    fn the_largest_lane_is_found_in_any_place(lanes in prop::array::uniform8(-1e9..1e9f32)) {
-        check(Largest(lanes))?;
+    fn reduce_max_finds_the_largest_lane_anywhere(lanes in prop::array::uniform8(-1e9..1e9f32)) {
+        check(ReduceMax(lanes))?;
         let largest = lanes.into_iter().fold(f32::MIN, f32::max);
-        prop_assert_eq!(Largest(lanes).run(Scalar), vec![[largest; LANES]]);
+        prop_assert_eq!(ReduceMax(lanes).run(Scalar), vec![[largest; LANES]]);
     }
 
     #[test]
-    fn places_count_along_the_rows_of_each_lane_s_image(
+    fn linear_indices_are_computed_with_the_stride_of_each_lane(
         strides in prop::array::uniform8(0..50_000i32),
-        x in whole_lanes(50_000),
-        y in whole_lanes(40_000),
+        x in integral_lanes(50_000),
+        y in integral_lanes(40_000),
     ) {
-        check(Places(&strides, x, y))?;
+        check(LinearIndices(&strides, x, y))?;
         let expected: [u32; LANES] =
             std::array::from_fn(|lane| y[lane] as u32 * strides[lane] as u32 + x[lane] as u32);
         prop_assert_eq!(Scalar.linear_indices(&strides, x, y), expected);
     }
 
     #[test]
-    fn samples_between_pixels_are_the_weighted_mean_of_four(
+    fn bilinear_samples_are_weighted_means_of_four_pixels(
         (gray, width, height) in image(),
         x in prop::array::uniform8(prop_oneof![-600.0..5_000.0f32, any_lane()]),
         y in prop::array::uniform8(prop_oneof![-600.0..5_000.0f32, any_lane()]),
@@ -204,31 +204,31 @@ proptest! {
         check(Bilinear(&taps, x, y))?;
         let samples = Bilinear(&taps, x, y).run(Scalar)[0];
         for lane in 0..LANES {
-            // The pixel before the place, and how far it is from there: of 256 parts, the last is the next pixel.
-            let split = |at: f32, size: usize| {
-                let parts = f64::from(at).max(0.0).min((size - 1) as f64 * 256.0).floor();
-                ((parts / 256.0) as usize, parts % 256.0 / 255.0)
+            // The pixel and the weight of the next one.
+            let split = |position: f32, size: usize| {
+                let steps = f64::from(position).max(0.0).min((size - 1) as f64 * 256.0).floor();
+                ((steps / 256.0) as usize, steps % 256.0 / 255.0)
             };
-            let ((column, along), (row, down)) = (split(x[lane], width), split(y[lane], height));
+            let ((column, fx), (row, fy)) = (split(x[lane], width), split(y[lane], height));
             let at = |column: usize, row: usize| {
                 f64::from(gray[row.min(height - 1) * width + column.min(width - 1)])
             };
-            let top = at(column, row) * (1.0 - along) + at(column + 1, row) * along;
-            let low = at(column, row + 1) * (1.0 - along) + at(column + 1, row + 1) * along;
-            let expected = top * (1.0 - down) + low * down;
+            let top = at(column, row) * (1.0 - fx) + at(column + 1, row) * fx;
+            let bottom = at(column, row + 1) * (1.0 - fx) + at(column + 1, row + 1) * fx;
+            let expected = top * (1.0 - fy) + bottom * fy;
             let sample = f64::from(samples[lane] / SAMPLE_SCALE) + 128.0;
             prop_assert!((sample - expected).abs() < 1e-4, "{} instead of {}", sample, expected);
         }
     }
 
     #[test]
-    fn gathered_taps_are_those_of_two_pairs_also_beyond_the_end(
+    fn gather_loads_two_pairs_and_clamps_indices(
         (gray, width, height) in image(),
-        at in prop::array::uniform8(prop_oneof![0..400u32, any::<u32>()]),
+        indices in prop::array::uniform8(prop_oneof![0..400u32, any::<u32>()]),
     ) {
         let taps = Taps::new(&gray, width, height);
-        check(Gather(&taps, &at))?;
-        for (gathered, index) in Scalar.gather(&taps, &at).into_iter().zip(at) {
+        check(Gather(&taps, &indices))?;
+        for (gathered, index) in Scalar.gather(&taps, &indices).into_iter().zip(indices) {
             let index = (index as usize).min(taps.pairs().len() - 2);
             let [first, second] = [taps.pairs()[index], taps.pairs()[index + 1]];
             let expected = [first, second].concat();
@@ -238,37 +238,37 @@ proptest! {
 }
 
 #[test]
-fn the_larger_and_smaller_of_what_is_not_a_number_is_the_second() {
+fn max_and_min_return_the_second_operand_for_nan_and_equal_zeros() {
     let (nan, one) = ([f32::NAN; LANES], [1.0; LANES]);
     for (a, b) in [(nan, one), (one, nan)] {
         let results = Arithmetic(a, b, one).run(Scalar);
         assert_eq!(bits(&results[6..8]), bits(&[b, b]));
     }
-    // Zeros of either sign are equal: the second again.
+    // 0 and -0 are equal.
     let results = Arithmetic([0.0; LANES], [-0.0; LANES], one).run(Scalar);
     assert_eq!(bits(&results[6..8]), bits(&[[-0.0; LANES]; 2]));
 }
 
 #[test]
-fn lanes_are_selected_by_their_bits_the_first_by_the_lowest() {
+fn select_takes_lane_0_from_the_lowest_bit() {
     let (a, b) = ([1.0; LANES], [2.0; LANES]);
     assert_eq!(Scalar.select(0b0000_0101, a, b), [1.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0]);
 }
 
 #[test]
-fn lanes_are_added_in_the_documented_tree() {
+fn reduce_sum_adds_in_the_documented_tree() {
     let l = [1e8, 3.0, -1e8, 0.1, 7.0, -2.5, 1.0, 1e-3];
     let tree = ((l[0] + l[4]) + (l[2] + l[6])) + ((l[1] + l[5]) + (l[3] + l[7]));
     let in_order = l.iter().fold(0.0f32, |sum, lane| sum + lane);
-    assert_ne!(tree, in_order, "the lanes must tell the orders apart");
+    assert_ne!(tree, in_order, "the lanes must distinguish the orders");
     assert_eq!(Scalar.reduce_sum(l), tree);
 }
 
 #[test]
-fn there_are_levels_and_the_last_is_the_best_of_the_machine() {
+fn the_best_available_level_is_detected() {
     assert!(levels().take(2).eq([SimdLevel::Scalar, SimdLevel::Baseline]));
     assert!(SimdLevel::detect().is_available());
-    // A machine whose AVX2 goes unused must not pass for tested.
+    // Fails, rather than skips, where AVX2 is there but not used.
     #[cfg(target_arch = "x86_64")]
     {
         let has_v3 = std::is_x86_feature_detected!("avx2")
@@ -284,7 +284,7 @@ fn there_are_levels_and_the_last_is_the_best_of_the_machine() {
 }
 
 #[test]
-fn a_level_the_machine_lacks_is_lowered() {
-    let (ran, _) = dispatch(SimdLevel::X86V3, Vectorized(Whole([0.0; LANES])));
+fn unavailable_levels_are_lowered() {
+    let (ran, _) = dispatch(SimdLevel::X86V3, Vectorized(Trunc([0.0; LANES])));
     assert_eq!(ran, levels().last().unwrap());
 }

@@ -18,21 +18,21 @@ pub struct Camera {
     pub fx: f64,
     /// Focal length in pixels along y.
     pub fy: f64,
-    /// Principal point, in pixels, where the center of the top-left pixel is 0.
+    /// Column of the principal point, in pixels; the center of the top-left pixel is 0.
     pub cx: f64,
-    /// Principal point, in pixels, where the center of the top-left pixel is 0.
+    /// Row of the principal point, in pixels; the center of the top-left pixel is 0.
     pub cy: f64,
-    /// World to camera.
+    /// Rotation from the world frame to the camera frame.
     pub rotation: DMat3,
-    /// World to camera, in world units.
+    /// Translation from the world frame to the camera frame, in world units.
     pub translation: DVec3,
 }
 
 impl Camera {
-    /// The widest or highest image the crate accepts, in pixels.
+    /// Largest width and height of an image, in pixels.
     pub const MAX_SIDE: u32 = 32_768;
 
-    /// Refuses a camera no image can have been taken with; `name` is how the error calls it.
+    /// Returns an error unless every field is in its valid range; `name` names the camera in the error.
     pub fn check(&self, name: &str) -> Result<()> {
         for (field, side) in [("width", self.width), ("height", self.height)] {
             if side == 0 || side > Self::MAX_SIDE {
@@ -66,12 +66,12 @@ impl Camera {
         Ok(())
     }
 
-    /// Number of pixels of its image.
+    /// Number of pixels of the image.
     pub fn pixels(&self) -> usize {
         self.width as usize * self.height as usize
     }
 
-    /// The grid of its pixels.
+    /// The pixel grid of the image.
     pub(crate) fn grid(&self) -> Grid {
         Grid { width: self.width as usize, height: self.height as usize }
     }
@@ -95,36 +95,36 @@ impl Camera {
         DVec3::new((pixel.x - self.cx) / self.fx, (pixel.y - self.cy) / self.fy, 1.0)
     }
 
-    /// A world point in the camera frame.
+    /// Transforms a world point into the camera frame.
     pub fn to_camera(&self, world: DVec3) -> DVec3 {
         self.rotation * world + self.translation
     }
 
-    /// The world point at `depth` behind `pixel`.
+    /// The world point at `depth` on the ray of `pixel`.
     pub fn unproject(&self, pixel: DVec2, depth: f64) -> DVec3 {
         self.rotation.transpose() * (self.ray(pixel) * depth - self.translation)
     }
 
-    /// The pixel a point of the camera frame falls on, `None` at or behind the camera.
+    /// Projects a point of the camera frame; `None` at or behind the camera.
     pub fn project_camera(&self, point: DVec3) -> Option<DVec2> {
         (point.z > 0.0)
             .then(|| DVec2::new(self.fx * point.x / point.z + self.cx, self.fy * point.y / point.z + self.cy))
     }
 
-    /// The pixel and depth of a world point, `None` at or behind the camera.
+    /// Projects a world point to its pixel and depth; `None` at or behind the camera.
     pub fn project(&self, world: DVec3) -> Option<(DVec2, f64)> {
         let point = self.to_camera(world);
         self.project_camera(point).map(|pixel| (pixel, point.z))
     }
 
-    /// Column and row of the pixel whose area holds `pixel`, `None` outside the image.
+    /// Column and row of the pixel whose area contains `pixel`; `None` outside the image.
     pub fn nearest_pixel(&self, pixel: DVec2) -> Option<(u32, u32)> {
         let (x, y) = ((pixel.x + 0.5).floor(), (pixel.y + 0.5).floor());
         let inside = x >= 0.0 && y >= 0.0 && x < f64::from(self.width) && y < f64::from(self.height);
         inside.then_some((x as u32, y as u32))
     }
 
-    /// The camera of the image reduced to half size, each pixel the mean of 2 x 2 (an odd side is rounded up).
+    /// The camera of the image at half size, in which a pixel is the mean of 2 x 2. Odd sides are rounded up.
     pub fn halved(&self) -> Camera {
         Camera {
             width: self.width.div_ceil(2),

@@ -1,8 +1,12 @@
-//! The depths at which surfaces are searched.
+//! Depth ranges: the depths between which surfaces are searched.
 
 use crate::error::{Error, Result};
+use std::ops::RangeInclusive;
 
-/// The depths at which surfaces are looked for, in world units, `0 < near < far`.
+/// Depths that are finite in the solver's f32, and so are their inverses.
+const REPRESENTABLE: RangeInclusive<f64> = 1e-30..=1e30;
+
+/// The range of depths in which surfaces are searched, in world units, `0 < near < far`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DepthRange {
     /// The smallest depth.
@@ -12,11 +16,11 @@ pub struct DepthRange {
 }
 
 impl DepthRange {
-    /// Refuses a range that holds no depth; `name` is how the error calls it.
+    /// Returns an error unless `0 < near < far` and both are representable; `name` names the range in the
+    /// error.
     pub fn check(&self, name: &str) -> Result<()> {
-        // Beyond these depths or their inverses leave the f32 of the solver.
-        let representable = 1e-30..=1e30;
-        if self.near < self.far && representable.contains(&self.near) && representable.contains(&self.far) {
+        let is_representable = |depth| REPRESENTABLE.contains(&depth);
+        if self.near < self.far && is_representable(self.near) && is_representable(self.far) {
             return Ok(());
         }
         Err(Error::argument(
@@ -27,7 +31,7 @@ impl DepthRange {
     }
 }
 
-/// A [`DepthRange`] in the solver's f32.
+/// A [`DepthRange`] in f32, as the search uses it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchRange {
     /// The smallest depth.
@@ -43,13 +47,13 @@ impl From<DepthRange> for SearchRange {
 }
 
 impl SearchRange {
-    /// Whether a depth lies within it; not where the depth is not a number.
+    /// Whether a depth lies in the range; false for NaN.
     #[inline(always)]
     pub fn contains(&self, depth: f32) -> bool {
         depth >= self.near && depth <= self.far
     }
 
-    /// The nearest depth within it.
+    /// The nearest depth in the range.
     #[inline(always)]
     pub fn clamp(&self, depth: f32) -> f32 {
         depth.clamp(self.near, self.far)
@@ -61,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_depth_range_the_solver_cannot_hold_is_refused() {
+    fn depth_ranges_that_are_empty_or_not_representable_are_errors() {
         let check = |near, far| DepthRange { near, far }.check("range");
         assert_eq!(check(0.5, 12.0), Ok(()));
         for (near, far) in [(2.0, 1.0), (1.0, 1.0), (0.0, 1.0), (-1.0, 1.0), (1e-60, 1.0), (1.0, 1e60)] {

@@ -1,4 +1,4 @@
-//! The pixel grid of an image: indices row by row, positions, neighbors.
+//! The pixel grid of an image: indices, positions and neighbors of pixels.
 
 /// Column and row of a pixel.
 pub type Position = (usize, usize);
@@ -6,12 +6,12 @@ pub type Position = (usize, usize);
 /// Offset between pixels, in columns and rows.
 pub type Offset = (i32, i32);
 
-/// The size of an image, with pixels numbered row by row.
+/// The size of an image, whose pixels are numbered row by row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Grid {
-    /// Pixels of a row.
+    /// Pixels per row.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
 }
 
@@ -33,15 +33,15 @@ impl Grid {
         (index % self.width, index / self.width)
     }
 
-    /// The position at an offset, `None` outside the image.
+    /// The position at an offset from another; `None` outside the image.
     #[inline(always)]
     pub fn neighbor(self, (x, y): Position, (dx, dy): Offset) -> Option<Position> {
-        // A negative coordinate wraps around to one beyond every image.
+        // A negative coordinate wraps around to one larger than any image.
         let (x, y) = (x.wrapping_add_signed(dx as isize), y.wrapping_add_signed(dy as isize));
         (x < self.width && y < self.height).then_some((x, y))
     }
 
-    /// The four neighbors of a pixel: left, right, above, below; `None` outside the image.
+    /// Indices of the neighbors to the left, to the right, above and below; `None` outside the image.
     #[inline(always)]
     pub fn four_neighbors(self, index: usize) -> [Option<usize>; 4] {
         let (x, y) = self.position(index);

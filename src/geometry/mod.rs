@@ -1,7 +1,7 @@
-//! Geometry of pinhole views: cameras, planes, relative poses, depth ranges, pixel grids and sets of views.
+//! Geometry of pinhole views: cameras, planes, relative poses, depth ranges, pixel grids and view sets.
 //!
-//! Conventions: `x_cam = R * X_world + t` with x right, y down, z forward; pixel centers are integers, the top-left
-//! pixel's center is (0, 0); depth is z in the camera frame.
+//! Conventions: `x_cam = R * X_world + t` with x right, y down, z forward; pixel centers are integers, the
+//! top-left pixel's center is (0, 0); depth is z in the camera frame.
 
 mod camera;
 mod depth_range;
@@ -11,7 +11,8 @@ mod relative_pose;
 mod view_set;
 
 pub use camera::Camera;
-pub use depth_range::{DepthRange, SearchRange};
+pub use depth_range::DepthRange;
+pub(crate) use depth_range::SearchRange;
 pub(crate) use grid::{Grid, Offset, Position};
 pub(crate) use plane::{MIN_FACING, PlaneHypothesis};
 pub use plane::{Plane, SlantedPlane};

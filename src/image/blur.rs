@@ -1,9 +1,9 @@
-//! Box blur and noise at single pixels.
+//! Box blur at single pixels.
 
 use super::PackedImage;
 use crate::geometry::Grid;
 
-/// Mean gray value of the pixels within `radius` columns and rows of a pixel and inside the image.
+/// Mean gray value of the pixels at most `radius` columns and rows away.
 pub fn blurred(image: &PackedImage, pixel: usize, radius: usize) -> f32 {
     let grid = Grid { width: image.width, height: image.height };
     let (x, y) = grid.position(pixel);
@@ -15,10 +15,4 @@ pub fn blurred(image: &PackedImage, pixel: usize, radius: usize) -> f32 {
         }
     }
     sum as f32 / count as f32
-}
-
-/// Standard deviation of the noise at a pixel, in gray values; 0 where it is not known.
-pub fn deviation(image: &PackedImage, pixel: usize) -> f32 {
-    let (x, y) = Grid { width: image.width, height: image.height }.position(pixel);
-    image.noise.variance(image.gray(x, y)).sqrt()
 }

@@ -1,4 +1,4 @@
-//! Images as the solver sees them: gray bytes, their pyramid and the packed layout the kernels sample.
+//! Images: photographs, their pyramid, the packed layout that the kernels sample, noise and blur.
 
 mod blur;
 mod noise;
@@ -6,8 +6,8 @@ mod packed_image;
 mod picture;
 mod pyramid;
 
-pub(crate) use blur::{blurred, deviation};
-pub use noise::Noise;
+pub(crate) use blur::blurred;
+pub(crate) use noise::{Noise, deviation};
 pub use packed_image::PackedImage;
 pub use picture::Picture;
 pub(crate) use pyramid::halve_mask;

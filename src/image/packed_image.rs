@@ -1,35 +1,36 @@
-//! A gray image as the kernels sample it.
+//! Gray images in the layout that the kernels sample, with their noise.
 
 use super::{Noise, Picture};
 use crate::simd::Taps;
 
-/// A gray image in the layout that bilinear samples are read from.
+/// A gray image, packed for bilinear sampling.
 #[derive(Debug, Clone)]
 pub struct PackedImage {
     /// Width in pixels.
     pub width: usize,
     /// Height in pixels.
     pub height: usize,
-    /// Its gray values.
+    /// Gray values in the layout of bilinear samples.
     pub taps: Taps,
-    /// Its noise.
-    pub noise: Noise,
+    /// Variance of the sensor noise.
+    pub(crate) noise: Noise,
 }
 
 impl PackedImage {
-    /// Packs a picture's gray values.
+    /// Packs the gray values of a picture and estimates their noise.
     ///
     /// # Panics
-    /// When a side is beyond 32,768 pixels, which no camera has.
+    /// If a side exceeds 32,768 pixels, the largest side of a camera.
     pub fn new(picture: &Picture) -> PackedImage {
         let (width, height) = (picture.width() as usize, picture.height() as usize);
         let taps = Taps::new(picture.gray(), width, height);
-        PackedImage { width, height, taps, noise: Noise::of(picture) }
+        PackedImage { width, height, taps, noise: Noise::estimate(picture) }
     }
 
     /// The gray value of a pixel.
     #[inline(always)]
     pub fn gray(&self, x: usize, y: usize) -> u8 {
+        // The pair at a pixel starts with its gray value, minus 128.
         (self.taps.pairs()[y * self.taps.stride() + x][0] as u8) ^ 0x80
     }
 }

@@ -1,9 +1,10 @@
-//! Pictures handed in by the host, and their downscale to half size.
+//! Photographs as the host passes them in.
 
 use crate::error::{Error, Result};
 use std::sync::Arc;
 
-/// A photograph: gray values for matching and, when there are any, colors for the points. Clones share the pixels.
+/// A photograph: gray values for matching and, optionally, colors for the point cloud. Clones share the
+/// pixels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Picture {
     width: u32,
@@ -13,13 +14,14 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// From gray values, row by row, `width * height` of them.
+    /// A picture from `width * height` gray values, row by row.
     pub fn from_gray(width: u32, height: u32, gray: Vec<u8>) -> Result<Picture> {
         check_size("picture.gray", width, height, gray.len())?;
         Ok(Picture { width, height, gray: Arc::new(gray), color: None })
     }
 
-    /// From red, green and blue, row by row, `width * height` of them. Gray is their luma (ITU-R BT.601).
+    /// A picture from `width * height` values of red, green and blue, row by row. Gray values are the luma of
+    /// ITU-R BT.601.
     pub fn from_rgb(width: u32, height: u32, color: Vec<[u8; 3]>) -> Result<Picture> {
         check_size("picture.color", width, height, color.len())?;
         let luma = |&[r, g, b]: &[u8; 3]| {
@@ -39,41 +41,23 @@ impl Picture {
         self.height
     }
 
-    /// Gray values row by row.
+    /// Gray values, row by row.
     pub fn gray(&self) -> &[u8] {
         &self.gray
     }
 
-    /// Red, green and blue row by row, when it has colors.
+    /// Red, green and blue, row by row; `None` for a gray picture.
     pub fn color(&self) -> Option<&[[u8; 3]]> {
         self.color.as_ref().map(|color| &color[..])
     }
 
-    /// Red, green and blue of the pixel with this index (row * width + column); gray thrice without colors.
+    /// Red, green and blue of the pixel with index `row * width + column`; three times the gray value in a
+    /// gray picture.
     pub fn rgb(&self, pixel: usize) -> [u8; 3] {
         match &self.color {
             Some(color) => color[pixel],
             None => [self.gray[pixel]; 3],
         }
-    }
-
-    /// The gray picture at half size: the rounded mean of 2 x 2 pixels, the last column and row repeated when a
-    /// side is odd.
-    pub fn halved(&self) -> Picture {
-        let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
-        let at = |x: u32, y: u32| {
-            let (x, y) = (x.min(self.width - 1), y.min(self.height - 1));
-            u32::from(self.gray[y as usize * self.width as usize + x as usize])
-        };
-        let mut gray = Vec::with_capacity(width as usize * height as usize);
-        for y in 0..height {
-            for x in 0..width {
-                let sum =
-                    at(2 * x, 2 * y) + at(2 * x + 1, 2 * y) + at(2 * x, 2 * y + 1) + at(2 * x + 1, 2 * y + 1);
-                gray.push(((sum + 2) / 4) as u8);
-            }
-        }
-        Picture { width, height, gray: Arc::new(gray), color: None }
     }
 }
 

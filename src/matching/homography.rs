@@ -1,13 +1,14 @@
-//! Plane-induced homographies in f32, split so that little is left to do for each hypothesis.
+//! Plane-induced homographies in f32, factored so that a hypothesis costs nine multiply-adds.
 
 use crate::geometry::{RelativePose, SlantedPlane};
 use glam::Vec3;
 
-/// A homography about a reference pixel: the offset (dx, dy) goes to `center + dx along_x + dy along_y`, homogeneous.
+/// A homography about a reference pixel: it maps the pixel at offset (dx, dy) to the homogeneous point
+/// `center + dx along_x + dy along_y`.
 /// The third coordinate is the depth in the source view divided by the depth in the reference view.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PatchHomography {
-    /// Where the pixel itself goes.
+    /// Image of the pixel itself.
     pub center: Vec3,
     /// Change per pixel along x.
     pub along_x: Vec3,

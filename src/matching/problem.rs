@@ -1,42 +1,42 @@
-//! A reference view and its source views on one scale, in f32 and in the reference camera's frame.
+//! A reference view and its source views at one scale, in f32 and in the reference camera's frame.
 
 use crate::geometry::{Camera, DepthRange, RelativePose, SearchRange};
 use crate::image::PackedImage;
 use crate::scene::CompactPlane;
 use glam::{Mat3, Vec3};
 
-/// The view whose maps are estimated.
+/// A matching problem: the reference view, whose maps are estimated, and its source views.
 #[derive(Debug, Clone)]
 pub struct Problem<'a> {
-    /// Its gray image.
+    /// Gray image of the reference view.
     pub image: &'a PackedImage,
-    /// 1 / fx and 1 / fy.
+    /// 1 / fx and 1 / fy, in 1 / px.
     pub inverse_focal: (f32, f32),
-    /// cx and cy.
+    /// cx and cy, in px.
     pub principal: (f32, f32),
-    /// The depths searched.
+    /// Range of the depths that are searched.
     pub range: SearchRange,
-    /// Its source views, in the order of its list.
+    /// The source views, in the order of the reference view's source list.
     pub sources: Vec<Source<'a>>,
 }
 
-/// A view the reference is matched with.
+/// A source view: one that the reference view is matched with.
 #[derive(Debug, Clone)]
 pub struct Source<'a> {
-    /// Its gray image.
+    /// Gray image of the source view.
     pub image: &'a PackedImage,
-    /// Where it stands, in pixels.
+    /// Pose relative to the reference camera, in pixel coordinates.
     pub pose: RelativePose,
-    /// Rotation from the reference camera's frame to its own.
+    /// Rotation from the reference camera's frame to the source camera's.
     pub rotation: Mat3,
-    /// Its center of projection in the reference camera's frame.
+    /// Center of projection in the reference camera's frame.
     pub center: Vec3,
-    /// Its validated solutions, one a pixel.
+    /// Validated planes of the source view, one per pixel; empty where none are published.
     pub surface: &'a [CompactPlane],
 }
 
 impl<'a> Problem<'a> {
-    /// A reference view without sources yet.
+    /// A reference view, without source views yet.
     pub fn new(camera: &Camera, image: &'a PackedImage, range: DepthRange) -> Problem<'a> {
         Problem {
             image,
@@ -47,7 +47,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// `K^-1 [x y 1]`.
+    /// `K^-1 [x y 1]`: the ray of a pixel, with z = 1.
     #[inline(always)]
     pub fn ray(&self, x: f32, y: f32) -> Vec3 {
         Vec3::new(
@@ -59,7 +59,7 @@ impl<'a> Problem<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// The source with this camera, seen from the reference camera.
+    /// A source view with this camera, relative to the reference camera.
     pub fn new(
         reference: &Camera,
         camera: &Camera,
@@ -78,7 +78,7 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Where a point falls in the source view.
+/// The pixel that a point projects to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Projection {
     /// Column in pixels.
@@ -88,7 +88,7 @@ pub struct Projection {
 }
 
 impl Source<'_> {
-    /// The pixel a homogeneous point falls on, `None` behind the camera or outside the image.
+    /// Dehomogenizes a point of the source view; `None` behind the camera or outside the image.
     #[inline(always)]
     pub fn project(&self, point: Vec3) -> Option<Projection> {
         let inverse = 1.0 / point.z;

@@ -1,11 +1,11 @@
-//! Sampling a source image through a homography, eight samples at a time.
+//! Sample positions of a patch in a source image under a homography, eight at a time.
 
 use super::PatchHomography;
 use crate::image::PackedImage;
 use crate::simd::{SUBPIXEL_STEPS, Simd, Taps};
 use glam::Vec3;
 
-/// A homography in all lanes and the source's image.
+/// A homography, broadcast to all lanes, and the source image it maps to.
 #[derive(Clone, Copy)]
 pub(super) struct Warp<'a, S: Simd> {
     center: [S::F32; 3],
@@ -25,7 +25,8 @@ impl<'a, S: Simd> Warp<'a, S> {
         }
     }
 
-    /// Aims at these offsets from the pixel; on the source camera's plane at the border.
+    /// Positions of these offsets from the pixel. Where the third homogeneous coordinate is 0, the quotient
+    /// is infinite or NaN and is clamped to the border of the image.
     #[inline(always)]
     pub fn positions(&self, simd: S, dx: S::F32, dy: S::F32) -> S::SamplePositions<'a> {
         let [x, y, z] = self.center;
@@ -33,7 +34,7 @@ impl<'a, S: Simd> Warp<'a, S> {
         self.positions_at(simd, [simd.add(x, step_x), simd.add(y, step_y), simd.add(z, step_z)])
     }
 
-    /// Aims at these offsets and at their opposites.
+    /// Positions of these offsets and of their opposites.
     #[inline(always)]
     pub fn mirrored_positions(&self, simd: S, dx: S::F32, dy: S::F32) -> [S::SamplePositions<'a>; 2] {
         let [x, y, z] = self.center;
@@ -44,20 +45,20 @@ impl<'a, S: Simd> Warp<'a, S> {
         ]
     }
 
-    /// Aims at the pixel itself.
+    /// Position of the pixel itself, in all lanes.
     #[inline(always)]
     pub fn center_position(&self, simd: S) -> S::SamplePositions<'a> {
         self.positions_at(simd, self.center)
     }
 
-    /// Aims at homogeneous places.
+    /// Positions of homogeneous points.
     #[inline(always)]
     fn positions_at(&self, simd: S, [x, y, z]: [S::F32; 3]) -> S::SamplePositions<'a> {
-        let parts_per_z = simd.div(simd.splat(SUBPIXEL_STEPS), z);
-        simd.sample_positions(self.source, simd.mul(x, parts_per_z), simd.mul(y, parts_per_z))
+        let scale = simd.div(simd.splat(SUBPIXEL_STEPS), z);
+        simd.sample_positions(self.source, simd.mul(x, scale), simd.mul(y, scale))
     }
 
-    /// How far the homogeneous coordinates of the samples are from the pixel's.
+    /// `dx along_x + dy along_y`: the steps from the pixel's homogeneous point to the samples'.
     #[inline(always)]
     fn step(&self, simd: S, dx: S::F32, dy: S::F32) -> [S::F32; 3] {
         let mut steps = self.center;

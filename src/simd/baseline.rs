@@ -1,14 +1,14 @@
-//! Vectors of the compile target's baseline, by way of `wide`.
+//! The baseline back-end: vectors of the compile target's baseline, from the crate `wide`.
 
 use super::{LANES, SUBPIXEL_STEPS, Scalar, Simd, SimdLevel, Taps};
 use std::array::from_fn;
 use wide::{f32x8, i32x8};
 
-/// The baseline back-end: SSE2 on x86-64, NEON on AArch64, simd128 on wasm.
+/// The token of the baseline back-end: SSE2 on x86-64, NEON on AArch64, simd128 on wasm.
 #[derive(Debug, Clone, Copy)]
 pub struct Baseline;
 
-/// Places in an image, in whole 256ths of a pixel.
+/// Eight positions in an image, clamped and truncated, in units of 1/256 px.
 #[derive(Debug, Clone, Copy)]
 pub struct SamplePositions<'a> {
     image: &'a Taps,
@@ -72,8 +72,8 @@ impl Simd for Baseline {
     }
 
     #[inline(always)]
-    fn select(self, bits: u8, a: f32x8, b: f32x8) -> f32x8 {
-        f32x8::new(Scalar.select(bits, a.to_array(), b.to_array()))
+    fn select(self, mask: u8, a: f32x8, b: f32x8) -> f32x8 {
+        f32x8::new(Scalar.select(mask, a.to_array(), b.to_array()))
     }
 
     #[inline(always)]
@@ -88,20 +88,19 @@ impl Simd for Baseline {
 
     #[inline(always)]
     fn sample_positions<'a>(self, image: &'a Taps, x: f32x8, y: f32x8) -> SamplePositions<'a> {
-        let (right, bottom) = image.last();
+        let (right, bottom) = image.max_position();
         let x = self.min(self.max(x, f32x8::ZERO), f32x8::splat(right)).trunc();
         let y = self.min(self.max(y, f32x8::ZERO), f32x8::splat(bottom)).trunc();
         SamplePositions { image, x, y }
     }
 
-    // `wide` has no gather: lanes are read one by one. Samples are whole and below 2^24, so f32 holds them exactly in
-    // whatever order they are worked out.
+    // `wide` has no gather: lanes are loaded one by one. Every intermediate value is an integer below 2^24,
+    // which f32 holds exactly, so the order of the operations does not change the result.
     #[inline(always)]
     fn sample_bilinear(self, SamplePositions { image, x, y }: SamplePositions) -> f32x8 {
-        let part = f32x8::splat(1.0 / SUBPIXEL_STEPS);
-        let (column, row) = ((x * part).trunc(), (y * part).trunc());
-        let (part_x, part_y) =
-            (x - column * f32x8::splat(SUBPIXEL_STEPS), y - row * f32x8::splat(SUBPIXEL_STEPS));
+        let (steps, step) = (f32x8::splat(SUBPIXEL_STEPS), f32x8::splat(1.0 / SUBPIXEL_STEPS));
+        let (column, row) = ((x * step).trunc(), (y * step).trunc());
+        let (fraction_x, fraction_y) = (x - column * steps, y - row * steps);
         let (columns, rows) = (column.to_array(), row.to_array());
         let pixels = image.pairs();
         let taps = i32x8::new(from_fn(|lane| {
@@ -109,18 +108,17 @@ impl Simd for Baseline {
             let [[a, b], [c, d]] = [pixels[index], pixels[index + 1]];
             i32::from_le_bytes([a, b, c, d].map(|tap| tap as u8))
         }));
-        // A tap comes from its byte by way of the highest one.
-        let tap =
-            |right: usize, low: usize| f32x8::from_i32x8(taps << (24 - 16 * right - 8 * low) as i32 >> 24);
-        let all = f32x8::splat(255.0);
-        let left = (all - part_y) * tap(0, 0) + part_y * tap(0, 1);
-        let right = (all - part_y) * tap(1, 0) + part_y * tap(1, 1);
-        (all - part_x) * left + part_x * right
+        // Shifting a tap's byte to the top and back sign-extends it.
+        let tap = |x: i32, y: i32| f32x8::from_i32x8(taps << (24 - 16 * x - 8 * y) >> 24);
+        let total = f32x8::splat(255.0);
+        let left = (total - fraction_y) * tap(0, 0) + fraction_y * tap(0, 1);
+        let right = (total - fraction_y) * tap(1, 0) + fraction_y * tap(1, 1);
+        (total - fraction_x) * left + fraction_x * right
     }
 
     #[inline(always)]
-    fn gather(self, image: &Taps, pairs: &[u32; LANES]) -> [u32; LANES] {
-        Scalar.gather(image, pairs)
+    fn gather(self, image: &Taps, indices: &[u32; LANES]) -> [u32; LANES] {
+        Scalar.gather(image, indices)
     }
 
     #[inline(always)]
@@ -138,7 +136,7 @@ impl Simd for Baseline {
         a.sqrt()
     }
 
-    // A function of its own, as where instructions beyond the compile target's are used.
+    // Not inlined, so that this back-end has the same function boundary as those with `#[target_feature]`.
     #[inline(never)]
     fn vectorize<R>(self, f: impl FnOnce() -> R) -> R {
         f()

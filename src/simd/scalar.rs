@@ -1,13 +1,13 @@
-//! One lane at a time: what the other back-ends are tested against.
+//! The scalar back-end: plain f32 arithmetic, lane by lane. The other back-ends are tested against it.
 
 use super::{LANES, Simd, SimdLevel, Taps};
 use std::array::from_fn;
 
-/// The scalar back-end.
+/// The token of the scalar back-end.
 #[derive(Debug, Clone, Copy)]
 pub struct Scalar;
 
-/// Places in an image, in 256ths of a pixel.
+/// Eight positions in an image, clamped, in units of 1/256 px.
 #[derive(Debug, Clone, Copy)]
 pub struct SamplePositions<'a> {
     image: &'a Taps,
@@ -71,8 +71,8 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
-    fn select(self, bits: u8, a: Self::F32, b: Self::F32) -> Self::F32 {
-        from_fn(|lane| if bits >> lane & 1 != 0 { a[lane] } else { b[lane] })
+    fn select(self, mask: u8, a: Self::F32, b: Self::F32) -> Self::F32 {
+        from_fn(|lane| if mask >> lane & 1 != 0 { a[lane] } else { b[lane] })
     }
 
     #[inline(always)]
@@ -87,7 +87,7 @@ impl Simd for Scalar {
 
     #[inline(always)]
     fn sample_positions<'a>(self, image: &'a Taps, x: Self::F32, y: Self::F32) -> SamplePositions<'a> {
-        let (right, bottom) = image.last();
+        let (right, bottom) = image.max_position();
         let x = self.min(self.max(x, [0.0; LANES]), [right; LANES]);
         let y = self.min(self.max(y, [0.0; LANES]), [bottom; LANES]);
         SamplePositions { image, x: x.map(|x| x as u32), y: y.map(|y| y as u32) }
@@ -100,16 +100,17 @@ impl Simd for Scalar {
             let index = (y >> 8) as usize * image.stride() + (x >> 8) as usize;
             let ([top_left, bottom_left], [top_right, bottom_right]) =
                 (image.pairs()[index], image.pairs()[index + 1]);
-            let between = |part: u32, a: i32, b: i32| (255 - part as i32) * a + part as i32 * b;
-            let left = between(y & 0xff, top_left.into(), bottom_left.into());
-            let right = between(y & 0xff, top_right.into(), bottom_right.into());
-            between(x & 0xff, left, right) as f32
+            let interpolate =
+                |fraction: u32, a: i32, b: i32| (255 - fraction as i32) * a + fraction as i32 * b;
+            let left = interpolate(y & 0xff, top_left.into(), bottom_left.into());
+            let right = interpolate(y & 0xff, top_right.into(), bottom_right.into());
+            interpolate(x & 0xff, left, right) as f32
         })
     }
 
     #[inline(always)]
-    fn gather(self, image: &Taps, pairs: &[u32; LANES]) -> [u32; LANES] {
-        pairs.map(|index| {
+    fn gather(self, image: &Taps, indices: &[u32; LANES]) -> [u32; LANES] {
+        indices.map(|index| {
             let index = (index as usize).min(image.pairs().len() - 2);
             let ([a, b], [c, d]) = (image.pairs()[index], image.pairs()[index + 1]);
             u32::from_le_bytes([a, b, c, d].map(|tap| tap as u8))
@@ -123,7 +124,7 @@ impl Simd for Scalar {
 
     #[inline(always)]
     fn reduce_max(self, a: Self::F32) -> f32 {
-        a.into_iter().fold(f32::NEG_INFINITY, |most, lane| if lane > most { lane } else { most })
+        a.into_iter().fold(f32::NEG_INFINITY, |largest, lane| if lane > largest { lane } else { largest })
     }
 
     #[inline(always)]
@@ -131,7 +132,8 @@ impl Simd for Scalar {
         a.map(f32::sqrt)
     }
 
-    // A function of its own, as where instructions beyond the compile target's are used.
+    // Not inlined, so that the scalar back-end has the same function boundary as those with
+    // `#[target_feature]`.
     #[inline(never)]
     fn vectorize<R>(self, f: impl FnOnce() -> R) -> R {
         f()

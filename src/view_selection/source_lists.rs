@@ -1,38 +1,43 @@
-//! The start set: views whose triangulation angle with the reference view lies in a band.
+//! The source list of each view: the views whose triangulation angle with it lies in a range.
 
 use crate::options::Options;
 use crate::scene::{Scene, View};
 use glam::{DVec2, DVec3};
 use std::collections::HashMap;
 
-/// The source views of every view.
+/// The source lists of all views.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct SourceLists {
-    /// For each view the indices of its source views: those in the band, smallest triangulation angle first, else
-    /// those nearest to it.
+    /// For each view the indices of its source views: those with a triangulation angle in the range, smallest
+    /// angle first; where there are none, those with the angles nearest to the range.
     pub lists: Vec<Vec<u32>>,
-    /// Views for which the band had to be left, and views without any source, in sentences.
+    /// One sentence for each view with source views outside the range, and for each one with too few source
+    /// views.
     pub warnings: Vec<String>,
 }
 
-/// Angles by pair of views, the lower index first.
+/// Triangulation angles, in degrees, at the sparse points that a pair of views shares; the lower index first.
 type SharedAngles = HashMap<(usize, usize), Vec<f64>>;
 
-/// Fewer shared points than this say little: a false match has any angle.
+/// Minimum number of shared points: with fewer, one false match decides the angle.
 const MIN_SHARED_POINTS: usize = 3;
-/// The percentile of the angles at shared points that stands for the pair.
-const ANGLE_PERCENTILE: f64 = 0.75;
-/// Sources taken from outside the band when none lies in it: validation needs at least two.
+/// Quantile of the angles at shared points that is the angle of the pair.
+const ANGLE_QUANTILE: f64 = 0.75;
+/// Number of source views taken from outside the range when none lies in it: validation needs at least two.
 const FALLBACK_SOURCES: usize = 2;
+/// Columns and rows of the points that stand for an image when there are no shared points, as fractions of
+/// its sides.
+const GRID_FRACTIONS: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 
-/// The start set of every view: all views that overlap with it and whose triangulation angle lies in the band of the
-/// options, or the ones nearest to the band when none does.
+/// The source list of every view: the one given with the scene, or else all views that overlap with it at a
+/// triangulation angle in the range of the options; where there are none, those with the angles nearest to
+/// the range.
 pub fn source_lists(scene: &Scene, options: &Options) -> SourceLists {
     let shared = shared_angles(scene);
-    let mut found = SourceLists::default();
+    let mut lists = SourceLists::default();
     for (index, view) in scene.views().iter().enumerate() {
         if let Some(sources) = &view.sources {
-            found.add(view, sources.clone(), options);
+            lists.add(view, sources.clone(), options);
             continue;
         }
         let mut angles: Vec<(f64, u32)> = (0..scene.views().len())
@@ -42,44 +47,45 @@ pub fn source_lists(scene: &Scene, options: &Options) -> SourceLists {
         angles.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let (min, max) =
             (options.view_selection.min_triangulation_angle, options.view_selection.max_triangulation_angle);
-        let in_band = |angle: f64| (min..=max).contains(&angle);
-        let mut list: Vec<u32> = angles.iter().filter(|a| in_band(a.0)).map(|a| a.1).collect();
+        let is_in_range = |angle: f64| (min..=max).contains(&angle);
+        let mut list: Vec<u32> = angles.iter().filter(|a| is_in_range(a.0)).map(|a| a.1).collect();
         if list.is_empty() {
             let distance = |angle: f64| (min - angle).max(angle - max);
             angles.sort_by(|a, b| distance(a.0).total_cmp(&distance(b.0)).then(a.1.cmp(&b.1)));
             angles.truncate(FALLBACK_SOURCES);
-            found.warnings.push(describe_fallback(&view.name, &angles, options));
+            lists.warnings.push(describe_fallback(&view.name, &angles, options));
             list = angles.iter().map(|a| a.1).collect();
         }
         if options.view_selection.max_sources > 0 {
             list.truncate(options.view_selection.max_sources as usize);
         }
-        found.add(view, list, options);
+        lists.add(view, list, options);
     }
-    found
+    lists
 }
 
-/// The triangulation angle between two views in degrees, as [`source_lists`] reckons it: the 75th percentile of the
-/// angles at the sparse points both saw or, without enough of them, of those at the first view's middle depth; `None`
-/// when they see nothing together.
+/// The triangulation angle of two views in degrees, as [`source_lists`] uses it: the 75th percentile of the
+/// angles at the sparse points that both saw or, where these are fewer than three, at points in the middle of
+/// the reference view's depth range; `None` where no such point is in both images.
 pub fn triangulation_angle(scene: &Scene, reference: usize, source: usize) -> Option<f64> {
     angle_of_pair(scene, &shared_angles(scene), reference, source)
 }
 
 fn angle_of_pair(scene: &Scene, shared: &SharedAngles, reference: usize, source: usize) -> Option<f64> {
     match shared.get(&(reference.min(source), reference.max(source))) {
-        Some(angles) if angles.len() >= MIN_SHARED_POINTS => percentile(angles.clone()),
-        _ => percentile(angles_at_middle_depth(scene, reference, source)),
+        Some(angles) if angles.len() >= MIN_SHARED_POINTS => quantile(angles.clone()),
+        _ => quantile(angles_at_middle_depth(scene, reference, source)),
     }
 }
 
 impl SourceLists {
-    /// The list of the next view, with a warning when it is too short for anything to be validated.
+    /// Adds the list of the next view, with a warning where it is too short for any pixel to be validated.
     fn add(&mut self, view: &View, list: Vec<u32>, options: &Options) {
         let needed = options.check.min_consistent_views as usize;
         if (1..needed).contains(&list.len()) {
             self.warnings.push(format!(
-                "{} has {} source view(s), but {needed} must agree with a solution: nothing can be validated in it",
+                "{} has {} source view(s), but {needed} must agree with a depth: none of its pixels can be \
+                 validated",
                 view.name,
                 list.len()
             ));
@@ -88,21 +94,21 @@ impl SourceLists {
     }
 }
 
-fn describe_fallback(name: &str, taken: &[(f64, u32)], options: &Options) -> String {
+fn describe_fallback(name: &str, fallback: &[(f64, u32)], options: &Options) -> String {
     let (min, max) =
         (options.view_selection.min_triangulation_angle, options.view_selection.max_triangulation_angle);
-    if taken.is_empty() {
-        return format!("{name} overlaps with no other view: no depth can be found for it");
+    if fallback.is_empty() {
+        return format!("{name} overlaps with no other view: no depth can be estimated for it");
     }
-    let angles: Vec<String> = taken.iter().map(|(angle, _)| format!("{angle:.1}")).collect();
+    let angles: Vec<String> = fallback.iter().map(|(angle, _)| format!("{angle:.1}")).collect();
     format!(
-        "{name} has no source view with a triangulation angle of {min} to {max} degrees; the nearest were taken, at {} \
-         degrees",
+        "{name} has no source view with a triangulation angle of {min} to {max} degrees; those with the \
+         nearest angles are used: {} degrees",
         angles.join(" and ")
     )
 }
 
-/// For each pair of views the angles, in degrees, at the sparse points both saw.
+/// The triangulation angles of all pairs of views at the sparse points.
 fn shared_angles(scene: &Scene) -> SharedAngles {
     let centers: Vec<DVec3> = scene.views().iter().map(|view| view.camera.center()).collect();
     let mut shared = SharedAngles::new();
@@ -110,8 +116,8 @@ fn shared_angles(scene: &Scene) -> SharedAngles {
         let mut views: Vec<usize> = point.views.iter().map(|&view| view as usize).collect();
         views.sort_unstable();
         views.dedup();
-        for (place, &a) in views.iter().enumerate() {
-            for &b in &views[place + 1..] {
+        for (index, &a) in views.iter().enumerate() {
+            for &b in &views[index + 1..] {
                 let angle = (centers[a] - point.position).angle_between(centers[b] - point.position);
                 shared.entry((a, b)).or_default().push(angle.to_degrees());
             }
@@ -120,29 +126,30 @@ fn shared_angles(scene: &Scene) -> SharedAngles {
     shared
 }
 
-/// Angles, in degrees, at points on rays of the reference view in the middle of its depth range that the other
-/// view has in its image. Never between optical axes: parallel cameras would get none.
-fn angles_at_middle_depth(scene: &Scene, reference: usize, other: usize) -> Vec<f64> {
+/// Triangulation angles, in degrees, at points on a grid of rays of the reference view, in the middle of its
+/// depth range; only at points inside the other view's image. The angle of the optical axes will not do: it
+/// is 0 for parallel cameras.
+fn angles_at_middle_depth(scene: &Scene, reference: usize, source: usize) -> Vec<f64> {
     let camera = &scene.views()[reference].camera;
-    let other = &scene.views()[other].camera;
+    let source = &scene.views()[source].camera;
     let range = scene.depth_range(reference);
-    // The geometric mean: ranges given by hand are generous, and the harmonic one would lie at their near end.
+    // The geometric mean: user-defined ranges are generous, and the harmonic mean lies at their near end.
     let depth = (range.near * range.far).sqrt();
-    let steps = [0.1, 0.3, 0.5, 0.7, 0.9];
     let mut angles = Vec::new();
-    for pixel in steps.iter().flat_map(|y| steps.map(|x| DVec2::new(x, *y))) {
-        let size = DVec2::new(f64::from(camera.width), f64::from(camera.height));
-        let point = camera.unproject(pixel * size, depth);
-        let seen = other.project(point).and_then(|(pixel, _)| other.nearest_pixel(pixel));
-        if seen.is_some() {
-            angles.push((camera.center() - point).angle_between(other.center() - point).to_degrees());
+    let size = DVec2::new(f64::from(camera.width), f64::from(camera.height));
+    for position in GRID_FRACTIONS.iter().flat_map(|y| GRID_FRACTIONS.map(|x| DVec2::new(x, *y))) {
+        let point = camera.unproject(position * size, depth);
+        let pixel = source.project(point).and_then(|(pixel, _)| source.nearest_pixel(pixel));
+        if pixel.is_some() {
+            angles.push((camera.center() - point).angle_between(source.center() - point).to_degrees());
         }
     }
     angles
 }
 
-fn percentile(mut angles: Vec<f64>) -> Option<f64> {
+/// The quantile of the angles at [`ANGLE_QUANTILE`]; `None` of none.
+fn quantile(mut angles: Vec<f64>) -> Option<f64> {
     angles.sort_by(f64::total_cmp);
     let last = angles.len().checked_sub(1)?;
-    Some(angles[(last as f64 * ANGLE_PERCENTILE).round() as usize])
+    Some(angles[(last as f64 * ANGLE_QUANTILE).round() as usize])
 }

@@ -1,12 +1,13 @@
-//! The rules of view selection one by one.
+//! View sets by incidence and visibility, source lists by triangulation angle.
 
-use super::{SourceLists, ViewRules, ViewSelector, are_occluded, faces_sources, source_lists};
+use super::rules::{are_occluded, faces_sources};
+use super::{SourceLists, ViewRules, ViewSelector, source_lists};
 use crate::geometry::{Camera, DepthRange, SlantedPlane, ViewSets};
 use crate::image::{PackedImage, Picture};
-use crate::matching::{PatchHomography, Problem, Projections, Source, SourceProjector};
+use crate::matching::{Problem, Source};
 use crate::options::Options;
 use crate::scene::{CompactPlane, Scene, SparsePoint, View};
-use crate::simd::{LANES, Scalar, Simd, SimdLevel, Task, dispatch};
+use crate::simd::{Scalar, Simd};
 use crate::testing::{changed, looking_at};
 use glam::{DVec3, Vec3};
 
@@ -14,34 +15,34 @@ const WIDTH: usize = 41;
 const HEIGHT: usize = 31;
 const CENTER: (f32, f32) = (20.0, 15.0);
 const RANGE: DepthRange = DepthRange { near: 1.8, far: 5.0 };
-/// Depth of the point that the middle pixel of the reference view sees, and that all cameras look at.
+/// Depth, at the middle pixel of the reference view, of the point that all cameras look at.
 const DEPTH: f32 = 4.0;
 
-/// A camera at `distance` from the point all look at, turned around it by `angle` degrees.
+/// A camera that looks at the origin from `distance`, turned around it by `angle` degrees.
 fn turned(angle: f64, distance: f64) -> Camera {
     let angle = angle.to_radians();
-    let towards = DVec3::new(angle.sin(), 0.0, -angle.cos());
-    looking_at(towards * distance, DVec3::ZERO, (WIDTH as u32, HEIGHT as u32), 40.0)
+    let direction = DVec3::new(angle.sin(), 0.0, -angle.cos());
+    looking_at(direction * distance, DVec3::ZERO, (WIDTH as u32, HEIGHT as u32), 40.0)
 }
 
 fn blank() -> Picture {
     Picture::from_gray(WIDTH as u32, HEIGHT as u32, vec![0; WIDTH * HEIGHT]).unwrap()
 }
 
-/// A reference camera in front of the point with sources around it.
+/// A reference camera in front of the point, and source cameras around it.
 struct Views {
     image: PackedImage,
-    problem: Camera,
+    reference: Camera,
     sources: Vec<Camera>,
-    /// The validated solutions of each source.
+    /// Validated planes of each source view.
     surfaces: Vec<Vec<CompactPlane>>,
 }
 
 impl Views {
     fn new(sources: Vec<Camera>) -> Views {
         let surfaces = vec![Vec::new(); sources.len()];
-        let problem = turned(0.0, f64::from(DEPTH));
-        Views { image: PackedImage::new(&blank()), problem, sources, surfaces }
+        let reference = turned(0.0, f64::from(DEPTH));
+        Views { image: PackedImage::new(&blank()), reference, sources, surfaces }
     }
 
     fn at_angles(angles: &[f64]) -> Views {
@@ -50,36 +51,36 @@ impl Views {
 
     /// The view set of the middle pixel for a plane with this normal.
     fn set(&self, options: &Options, min_views: usize, normal: Vec3) -> Vec<usize> {
-        let mut problem = Problem::new(&self.problem, &self.image, RANGE);
+        let mut problem = Problem::new(&self.reference, &self.image, RANGE);
         let sources = self.sources.iter().zip(&self.surfaces);
-        problem.sources =
-            sources.map(|(camera, s)| Source::new(&self.problem, camera, &self.image, s)).collect();
+        problem.sources = sources
+            .map(|(camera, surface)| Source::new(&self.reference, camera, &self.image, surface))
+            .collect();
         let mut words = vec![0u32; self.sources.len().div_ceil(32)];
         let rules = ViewRules::new(options, min_views);
         ViewSelector::new(Scalar, &problem, rules).select(&mut words, CENTER, DEPTH, normal);
-        let bit = |place: &usize| words[place / 32] >> (place % 32) & 1 != 0;
-        (0..32 * words.len()).filter(bit).collect()
+        ViewSets::iter_words(&words).collect()
     }
 }
 
-/// The plane that faces the reference camera.
+/// Normal of a plane that faces the reference camera.
 const FACING: Vec3 = Vec3::NEG_Z;
 
 #[test]
-fn a_source_at_grazing_incidence_is_left_out() {
+fn sources_at_grazing_incidence_are_not_selected() {
     let views = Views::at_angles(&[79.0, 81.0, -79.0, -81.0, 0.5]);
     assert_eq!(views.set(&Options::default(), 0, FACING), [0, 2, 4]);
     let strict = changed(Options::default(), |o| {
         o.view_selection.max_incident_angle = 60.0;
     });
     assert_eq!(views.set(&strict, 0, FACING), [4]);
-    // The angle is the one with the normal, not with the reference's ray.
+    // The incident angle is measured from the normal, not from the ray of the reference view.
     let tilted = Vec3::new(40f32.to_radians().sin(), 0.0, -40f32.to_radians().cos());
     assert_eq!(views.set(&Options::default(), 0, tilted), [0, 1, 4]);
 }
 
 #[test]
-fn a_surface_seen_from_behind_faces_nobody() {
+fn a_surface_faces_no_source_behind_it() {
     let normal = Vec3::new(0.0, 0.6, -0.8);
     let point = Vec3::new(1.0, 2.0, 5.0);
     let faces = |center: Vec3, min_cosine: f32| {
@@ -92,7 +93,7 @@ fn a_surface_seen_from_behind_faces_nobody() {
 }
 
 #[test]
-fn a_validated_surface_in_front_hides_the_point_from_its_view() {
+fn sources_with_a_validated_surface_in_front_are_not_selected() {
     let mut views = Views::at_angles(&[10.0; 5]);
     let nearest = CENTER.1 as usize * WIDTH + CENTER.0 as usize;
     for (surface, factor) in views.surfaces.iter_mut().zip([0.5, 0.985, 0.995, 1.0, 1.5]) {
@@ -108,7 +109,7 @@ fn a_validated_surface_in_front_hides_the_point_from_its_view() {
         o.view_selection.occlusion_tolerance = 0.02;
     });
     assert_eq!(views.set(&wide, 0, FACING), [1, 2, 3, 4]);
-    // A view that found nothing hides nothing.
+    // Without a validated surface there is no occlusion.
     for surface in &mut views.surfaces {
         surface[nearest] = CompactPlane::default();
     }
@@ -116,7 +117,7 @@ fn a_validated_surface_in_front_hides_the_point_from_its_view() {
 }
 
 #[test]
-fn the_occlusion_margin_is_relative() {
+fn the_occlusion_tolerance_is_relative() {
     for scale in [1.0, 1000.0] {
         let factors = [0.5, 0.98, 0.995, 1.0, 1.1, 2.0, 1e6, f32::INFINITY];
         let validated = factors.map(|factor| 1.0 / (factor * scale));
@@ -125,7 +126,7 @@ fn the_occlusion_margin_is_relative() {
 }
 
 #[test]
-fn a_source_without_the_point_in_its_image_is_left_out() {
+fn sources_whose_image_does_not_contain_the_point_are_not_selected() {
     let mut away = turned(10.0, 4.0);
     away.cx += 50.0;
     let mut behind = turned(10.0, 4.0);
@@ -134,7 +135,7 @@ fn a_source_without_the_point_in_its_image_is_left_out() {
     at_the_last_pixel.cx = WIDTH as f64 - 1.01;
     let views = Views::new(vec![away, turned(10.0, 4.0), behind, at_the_last_pixel]);
     assert_eq!(views.set(&Options::default(), 0, FACING), [1, 3]);
-    // Images count even where views are not selected.
+    // This holds without pixelwise view selection too.
     let off = changed(Options::default(), |o| {
         o.view_selection.pixelwise_view_selection = false;
     });
@@ -142,7 +143,7 @@ fn a_source_without_the_point_in_its_image_is_left_out() {
 }
 
 #[test]
-fn without_view_selection_incidence_does_not_matter() {
+fn without_pixelwise_view_selection_incidence_is_ignored() {
     let off = changed(Options::default(), |o| {
         o.view_selection.pixelwise_view_selection = false;
     });
@@ -150,7 +151,7 @@ fn without_view_selection_incidence_does_not_matter() {
 }
 
 #[test]
-fn a_set_that_became_too_small_starts_again_from_all_sources() {
+fn a_set_that_is_too_small_is_replaced_by_all_sources() {
     let views = Views::at_angles(&[85.0, 20.0, -85.0]);
     let options = Options::default();
     assert_eq!(views.set(&options, 0, FACING), [1]);
@@ -159,29 +160,16 @@ fn a_set_that_became_too_small_starts_again_from_all_sources() {
 }
 
 #[test]
-fn there_may_be_more_than_32_and_64_sources() {
-    let angles: Vec<f64> = (0..70).map(|place| if place % 3 == 0 { 20.0 } else { 85.0 }).collect();
+fn sets_of_more_than_64_sources_are_selected() {
+    let angles: Vec<f64> = (0..70).map(|source| if source % 3 == 0 { 20.0 } else { 85.0 }).collect();
     let views = Views::at_angles(&angles);
-    let kept: Vec<usize> = (0..70).step_by(3).collect();
-    assert_eq!(views.set(&Options::default(), 2, FACING), kept);
-    // Too few: all 70, and none beyond.
+    let facing: Vec<usize> = (0..70).step_by(3).collect();
+    assert_eq!(views.set(&Options::default(), 2, FACING), facing);
+    // Too few: replaced by exactly the 70 sources.
     assert!(views.set(&Options::default(), 30, FACING).into_iter().eq(0..70));
-
-    for sources in [0, 1, 31, 32, 33, 64, 65, 70] {
-        let mut sets = ViewSets::full(3, sources);
-        assert_eq!(sets.count(1), sources);
-        assert!(sets.iter(1).eq(0..sources));
-        sets = ViewSets::empty(3, sources);
-        if let Some(last) = sources.checked_sub(1) {
-            sets.insert(1, last);
-            assert!(sets.contains(1, last) && !sets.contains(0, last) && !sets.contains(2, last));
-            assert!(sets.iter(1).eq([last]));
-        }
-        assert_eq!([0, 2].map(|pixel| sets.count(pixel)), [0, 0]);
-    }
 }
 
-/// The start sets of cameras that see some points.
+/// The source lists of cameras that see some sparse points.
 fn lists(cameras: &[Camera], points: &[(DVec3, &[u32])], options: &Options) -> SourceLists {
     let views = cameras.iter().enumerate().map(|(index, camera)| View {
         name: format!("view{index}"),
@@ -204,27 +192,28 @@ fn ten_to_thirty() -> Options {
     })
 }
 
-/// Cameras around the origin, which is their middle depth too when they are 3 units away.
+/// Cameras around the origin, at a distance of 3, the middle of their depth range.
 fn around(angles: &[f64]) -> Vec<Camera> {
     angles.iter().map(|&angle| turned(angle, 3.0)).collect()
 }
 
 #[test]
-fn views_within_the_band_of_angles_become_sources_smallest_angle_first() {
+fn views_with_angles_in_the_range_are_sources_smallest_angle_first() {
     let cameras = around(&[0.0, 29.0, 31.0, 9.0, -11.0, -20.0]);
-    let everybody: &[u32] = &[0, 1, 2, 3, 4, 5];
-    // Three points at the same place: enough to be believed.
-    let found = lists(&cameras, &[(DVec3::ZERO, everybody); 3], &ten_to_thirty());
-    assert_eq!(found.lists[0], [4, 5, 1]);
-    assert!(found.warnings.is_empty(), "{:?}", found.warnings);
-    // Without points the angles are those at the middle depth, here about the same; 9 and 31 are too near the band.
+    let all: &[u32] = &[0, 1, 2, 3, 4, 5];
+    // Three points at the same position: the minimum number.
+    let result = lists(&cameras, &[(DVec3::ZERO, all); 3], &ten_to_thirty());
+    assert_eq!(result.lists[0], [4, 5, 1]);
+    assert!(result.warnings.is_empty(), "{:?}", result.warnings);
+    // Without points the angles are those at the middle depth, about the same here; 9 and 31 are too near the
+    // limits.
     let cameras = around(&[0.0, 26.0, 60.0, 5.0, -13.0, -20.0]);
-    let found = lists(&cameras, &[], &ten_to_thirty());
-    assert_eq!(found.lists[0], [4, 5, 1]);
+    let result = lists(&cameras, &[], &ten_to_thirty());
+    assert_eq!(result.lists[0], [4, 5, 1]);
 }
 
 #[test]
-fn sources_given_by_hand_are_taken_as_they_are() {
+fn source_lists_of_the_scene_are_used_unchanged() {
     let views = |sources: Option<Vec<u32>>| -> Vec<View> {
         let view = |(index, camera): (usize, &Camera)| View {
             name: format!("view{index}"),
@@ -236,9 +225,9 @@ fn sources_given_by_hand_are_taken_as_they_are() {
         };
         around(&[0.0, 20.0, 60.0, 15.0]).iter().enumerate().map(view).collect()
     };
-    let found = source_lists(&Scene::new(views(Some(vec![2, 1])), vec![]).unwrap(), &ten_to_thirty());
-    // 60 degrees lie far outside the band, and the other views are chosen as ever.
-    assert_eq!((&found.lists[0][..], &found.lists[3][..]), (&[2, 1][..], &[0][..]));
+    let result = source_lists(&Scene::new(views(Some(vec![2, 1])), vec![]).unwrap(), &ten_to_thirty());
+    // 60 degrees lie far outside the range; the lists of the other views are computed.
+    assert_eq!((&result.lists[0][..], &result.lists[3][..]), (&[2, 1][..], &[0][..]));
     for wrong in [vec![4], vec![0], vec![1, 1]] {
         let error = Scene::new(views(Some(wrong)), vec![]).unwrap_err().to_string();
         assert!(error.contains("views[0] (view0).sources["), "{error}");
@@ -246,10 +235,10 @@ fn sources_given_by_hand_are_taken_as_they_are() {
 }
 
 #[test]
-fn the_angle_of_two_views_is_the_75th_percentile_at_their_shared_points() {
+fn the_angle_of_two_views_is_the_75th_percentile_at_shared_points() {
     let camera = |x: f64| looking_at(DVec3::new(x, 0.0, 0.0), DVec3::new(x, 0.0, 1.0), (41, 31), 40.0);
     let cameras = [camera(-0.5), camera(0.5)];
-    // Seen under 28 and 6 degrees.
+    // Triangulation angles of 28 and 6 degrees.
     let (near, far) = (DVec3::new(0.0, 0.0, 2.0), DVec3::new(0.0, 0.0, 10.0));
     let both: &[u32] = &[0, 1];
     let lists = |near_points: usize| {
@@ -262,53 +251,57 @@ fn the_angle_of_two_views_is_the_75th_percentile_at_their_shared_points() {
 }
 
 #[test]
-fn parallel_cameras_get_sources_though_their_axes_enclose_no_angle() {
+fn parallel_cameras_have_sources() {
     let camera = |x: f64| looking_at(DVec3::new(x, 0.0, 0.0), DVec3::new(x, 0.0, 1.0), (41, 31), 40.0);
-    let found = lists(&[0.0, 0.5, 1.0, 1.5].map(camera), &[], &ten_to_thirty());
-    assert!(found.warnings.is_empty(), "{:?}", found.warnings);
+    let result = lists(&[0.0, 0.5, 1.0, 1.5].map(camera), &[], &ten_to_thirty());
+    assert!(result.warnings.is_empty(), "{:?}", result.warnings);
     // At a depth of 3: 9, 18 and 27 degrees.
-    assert_eq!(found.lists[0], [2, 3]);
-    assert_eq!(found.lists[1], [3]);
+    assert_eq!(result.lists[0], [2, 3]);
+    assert_eq!(result.lists[1], [3]);
 }
 
 #[test]
-fn without_a_view_in_the_band_the_nearest_to_it_are_taken_with_a_warning() {
+fn without_angles_in_the_range_the_nearest_are_used_with_a_warning() {
     let points: [(DVec3, &[u32]); 3] = [(DVec3::ZERO, &[0, 1, 2, 3]); 3];
-    let found = lists(&around(&[0.0, 2.0, 5.0, 7.0]), &points, &ten_to_thirty());
-    let mut taken = found.lists[0].clone();
-    taken.sort_unstable();
-    assert_eq!(taken, [2, 3]);
-    assert!(found.warnings[0].contains("view0"), "{}", found.warnings[0]);
-    assert!(found.warnings[0].contains("10 to 30 degrees"), "{}", found.warnings[0]);
-    assert!(found.warnings[0].contains("7.0") && found.warnings[0].contains("5.0"), "{}", found.warnings[0]);
-}
-
-#[test]
-fn a_view_that_overlaps_with_no_other_is_told() {
-    let away = looking_at(DVec3::new(0.0, 0.0, -4.0), DVec3::new(0.0, 0.0, -8.0), (41, 31), 40.0);
-    let found = lists(&[turned(0.0, 3.0), turned(15.0, 3.0), away], &[], &ten_to_thirty());
-    assert_eq!(found.lists, [vec![1], vec![0], vec![]]);
-    let [warning] = &found.warnings[..] else { panic!("{:?}", found.warnings) };
-    assert!(warning.contains("view2") && warning.contains("overlaps with no other view"), "{warning}");
-}
-
-#[test]
-fn a_view_with_too_few_sources_to_validate_anything_is_told() {
-    let options = changed(ten_to_thirty(), |o| {
-        o.check.min_consistent_views = 2;
-    });
-    let found = lists(&around(&[0.0, 15.0]), &[], &options);
-    assert_eq!(found.lists, [vec![1], vec![0]]);
-    assert_eq!(found.warnings.len(), 2, "{:?}", found.warnings);
+    let result = lists(&around(&[0.0, 2.0, 5.0, 7.0]), &points, &ten_to_thirty());
+    let mut list = result.lists[0].clone();
+    list.sort_unstable();
+    assert_eq!(list, [2, 3]);
+    assert!(result.warnings[0].contains("view0"), "{}", result.warnings[0]);
+    assert!(result.warnings[0].contains("10 to 30 degrees"), "{}", result.warnings[0]);
     assert!(
-        found.warnings[0].contains("view0 has 1 source view(s), but 2 must agree"),
-        "{:?}",
-        found.warnings
+        result.warnings[0].contains("7.0") && result.warnings[0].contains("5.0"),
+        "{}",
+        result.warnings[0]
     );
 }
 
 #[test]
-fn at_most_so_many_sources_are_taken() {
+fn a_view_without_overlap_gives_a_warning() {
+    let away = looking_at(DVec3::new(0.0, 0.0, -4.0), DVec3::new(0.0, 0.0, -8.0), (41, 31), 40.0);
+    let result = lists(&[turned(0.0, 3.0), turned(15.0, 3.0), away], &[], &ten_to_thirty());
+    assert_eq!(result.lists, [vec![1], vec![0], vec![]]);
+    let [warning] = &result.warnings[..] else { panic!("{:?}", result.warnings) };
+    assert!(warning.contains("view2") && warning.contains("overlaps with no other view"), "{warning}");
+}
+
+#[test]
+fn a_view_with_fewer_sources_than_must_agree_gives_a_warning() {
+    let options = changed(ten_to_thirty(), |o| {
+        o.check.min_consistent_views = 2;
+    });
+    let result = lists(&around(&[0.0, 15.0]), &[], &options);
+    assert_eq!(result.lists, [vec![1], vec![0]]);
+    assert_eq!(result.warnings.len(), 2, "{:?}", result.warnings);
+    assert!(
+        result.warnings[0].contains("view0 has 1 source view(s), but 2 must agree"),
+        "{:?}",
+        result.warnings
+    );
+}
+
+#[test]
+fn source_lists_are_cut_off_at_max_sources() {
     let points: [(DVec3, &[u32]); 3] = [(DVec3::ZERO, &[0, 1, 2, 3]); 3];
     let list = |max_sources| {
         let options = changed(ten_to_thirty(), |o| {
@@ -320,110 +313,4 @@ fn at_most_so_many_sources_are_taken() {
     assert_eq!(list(3).len(), 3);
     assert_eq!(list(2).len(), 2);
     assert_eq!(list(1).len(), 1);
-}
-
-/// Where a hypothesis falls in a source view that has it in its image.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Placement {
-    source: usize,
-    homography: PatchHomography,
-    x: f32,
-    y: f32,
-}
-
-/// Where the planes of a pixel fall in the sources of a set, which is taken on the way to the pixel or afterwards.
-struct Place<'a> {
-    problem: &'a Problem<'a>,
-    pixel: (f32, f32),
-    set: &'a [u32],
-    planes: &'a [SlantedPlane],
-    afterwards: bool,
-}
-
-impl Task for Place<'_> {
-    type Output = Vec<Vec<Placement>>;
-
-    fn run<S: Simd>(self, simd: S) -> Self::Output {
-        let Place { problem, pixel: (x, y), set, planes, afterwards } = self;
-        let mut projector = SourceProjector::new(simd, problem);
-        projector.set_pixel_and_views(x, y, if afterwards { &[0x3ff] } else { set });
-        if afterwards {
-            projector.set_views(set);
-        }
-        let place = |plane: &SlantedPlane| {
-            let mut found = Vec::new();
-            for group in projector.groups() {
-                let projections = group.project(simd, 1.0 / plane.inverse_depth);
-                let slopes = group.slopes(simd, plane);
-                assert_eq!(projections.inside.checked_shr(group.sources().len() as u32).unwrap_or(0), 0);
-                assert_is_within(&projections, problem, group.sources());
-                for (lane, &source) in group.sources().iter().enumerate() {
-                    if projections.inside >> lane & 1 != 0 {
-                        let (x, y) = (projections.column[lane], projections.row[lane]);
-                        found.push(Placement {
-                            source,
-                            homography: projections.homography(&slopes, lane),
-                            x,
-                            y,
-                        });
-                    }
-                }
-            }
-            found
-        };
-        planes.iter().map(place).collect()
-    }
-}
-
-/// Columns and rows are within the images also where the hypothesis is not.
-fn assert_is_within(projections: &Projections, problem: &Problem, sources: &[usize]) {
-    for lane in 0..LANES {
-        let image = sources.get(lane).map(|&source| problem.sources[source].image);
-        let (right, bottom) =
-            image.map_or((0.0, 0.0), |image| ((image.width - 1) as f32, (image.height - 1) as f32));
-        assert!((0.0..=right).contains(&projections.column[lane]), "lane {lane}: {projections:?}");
-        assert!((0.0..=bottom).contains(&projections.row[lane]), "lane {lane}: {projections:?}");
-    }
-}
-
-#[test]
-fn eight_sources_at_once_are_found_where_each_alone_is() {
-    let angles: Vec<f64> = (0..11).map(|view| f64::from(view) * 34.0 - 170.0).collect();
-    let mut views = Views::at_angles(&angles);
-    views.sources[3].cx += 15.0;
-    let mut problem = Problem::new(&views.problem, &views.image, RANGE);
-    problem.sources =
-        (views.sources.iter()).map(|camera| Source::new(&views.problem, camera, &views.image, &[])).collect();
-    let planes: Vec<SlantedPlane> = [0.001, 1.0, 2.5, 3.9, DEPTH, 4.1, 5.0, 8.0, 1e6]
-        .map(|depth| SlantedPlane { inverse_depth: 1.0 / depth, slope_x: 0.003, slope_y: -0.007 })
-        .into();
-    let (mut inside, mut outside) = (0, 0);
-    for set in [0x7ff, 0x555, 0x400, 0u32] {
-        for (x, y) in [CENTER, (0.0, 0.0), (40.0, 30.0), (7.0, 22.0)] {
-            let expected: Vec<Vec<Placement>> = (planes.iter())
-                .map(|plane| {
-                    let place = |source: usize| {
-                        let Source { pose, .. } = &problem.sources[source];
-                        // The depth goes there and back, as it does for food sources.
-                        let plane =
-                            SlantedPlane { inverse_depth: 1.0 / (1.0 / plane.inverse_depth), ..*plane };
-                        let homography = PatchHomography::of_plane(&pose, pose.at_infinity(x, y), &plane);
-                        let at = problem.sources[source].project(homography.center)?;
-                        Some(Placement { source, homography, x: at.x, y: at.y })
-                    };
-                    (0..11).filter(|source| set >> source & 1 != 0).filter_map(place).collect()
-                })
-                .collect();
-            inside += expected.iter().map(Vec::len).sum::<usize>();
-            outside += expected.iter().map(|found| set.count_ones() as usize - found.len()).sum::<usize>();
-            for level in SimdLevel::ALL.into_iter().filter(|level| level.is_available()) {
-                for afterwards in [false, true] {
-                    let (problem, pixel, set) = (&problem, (x, y), &[set][..]);
-                    let task = Place { problem, pixel, set, planes: &planes, afterwards };
-                    assert_eq!(dispatch(level, task), expected, "{}", level.name());
-                }
-            }
-        }
-    }
-    assert!(inside > 50 && outside > 50, "{inside} inside and {outside} outside");
 }

@@ -1,6 +1,6 @@
-//! Shared by the integration tests.
+//! Helpers of the integration tests and benches.
 
-// Every test file is a crate of its own and uses its own part of this module.
+// Each test file is a crate of its own and uses only a part of this module.
 #![allow(dead_code)]
 
 pub mod measure;

@@ -1,12 +1,12 @@
-//! Scenes made in code, whose depth, normal and visibility are known exactly: rectangles and spheres with solid
-//! texture, ray-cast. Nothing in them is random from run to run.
+//! Procedural scenes with exact depth, normal and visibility: ray-cast rectangles and spheres with solid
+//! texture. They are the same in every run.
 
 use glam::{DMat3, DVec2, DVec3};
 use skep::geometry::Camera;
 use skep::image::Picture;
 use skep::{Maps, Scene, SparsePoint, View};
 
-/// What a surface looks like.
+/// The texture of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Texture {
     /// Several octaves of noise over the world position.
@@ -18,37 +18,37 @@ pub enum Texture {
 /// A finite surface of the world.
 #[derive(Debug, Clone, Copy)]
 pub enum Shape {
-    /// A rectangle around `center`, spanned by the unit vectors `right` and `down`, seen from both sides.
+    /// A rectangle around `center`, spanned by the unit vectors `right` and `down`, visible from both sides.
     Rectangle { center: DVec3, right: DVec3, down: DVec3, half_size: DVec2 },
     /// A sphere.
     Sphere { center: DVec3, radius: f64 },
 }
 
-/// A shape with its look.
+/// A shape with its texture.
 #[derive(Debug, Clone, Copy)]
 pub struct Surface {
     pub shape: Shape,
     pub texture: Texture,
 }
 
-/// Where a ray meets the world.
+/// The intersection of a ray with a surface.
 #[derive(Debug, Clone, Copy)]
 pub struct Hit {
-    /// In multiples of the ray's direction.
+    /// Distance from the origin of the ray, in multiples of its direction.
     pub distance: f64,
-    /// In the world frame.
+    /// Position in the world frame.
     pub position: DVec3,
-    /// In the world frame, towards the ray's origin.
+    /// Normal in the world frame, towards the origin of the ray.
     pub normal: DVec3,
     /// Index of the surface.
     pub surface: usize,
 }
 
-/// Photographs of a world, with the truth.
+/// Rendered views of surfaces, with the truth.
 pub struct Procedural {
     pub surfaces: Vec<Surface>,
     pub views: Vec<View>,
-    /// Exact surface points at textured places, with the views that see them.
+    /// Exact points on textured surfaces, with the views that see them.
     pub points: Vec<SparsePoint>,
     /// Exact depth and normal of every view.
     pub truth: Vec<Maps>,
@@ -60,9 +60,9 @@ pub const SIZE: (u32, u32) = (128, 96);
 const FOCAL: f64 = 130.0;
 /// Distance of the standard cameras from the world's origin.
 const DISTANCE: f64 = 4.0;
-/// Rays a pixel's side: the image is the mean over the pixel's area.
+/// Rays per column and row of a pixel: a gray value is the mean over the pixel's area.
 const SUPERSAMPLES: u32 = 3;
-/// Pixels between the sparse points.
+/// Distance of the sparse points, in px.
 const POINT_STEP: usize = 7;
 
 impl Shape {
@@ -80,8 +80,9 @@ impl Shape {
         }
     }
 
-    /// The nearest meeting in front of `origin`: distance in multiples of `direction`, and outward normal.
-    fn meet(&self, origin: DVec3, direction: DVec3) -> Option<(f64, DVec3)> {
+    /// The nearest intersection in front of `origin`: distance in multiples of `direction`, and outward
+    /// normal.
+    fn intersect(&self, origin: DVec3, direction: DVec3) -> Option<(f64, DVec3)> {
         match *self {
             Shape::Rectangle { center, right, down, half_size } => {
                 let normal = right.cross(down);
@@ -102,11 +103,11 @@ impl Shape {
     }
 }
 
-/// The first surface along a ray; of surfaces at the same place the one that is listed first.
+/// The nearest intersection of a ray; of surfaces at the same distance the first in the list.
 fn cast(surfaces: &[Surface], origin: DVec3, direction: DVec3) -> Option<Hit> {
     let mut nearest: Option<Hit> = None;
     for (surface, Surface { shape, .. }) in surfaces.iter().enumerate() {
-        if let Some((distance, outward)) = shape.meet(origin, direction)
+        if let Some((distance, outward)) = shape.intersect(origin, direction)
             && nearest.is_none_or(|hit| distance < hit.distance)
         {
             let normal = if outward.dot(direction) > 0.0 { -outward } else { outward };
@@ -116,39 +117,40 @@ fn cast(surfaces: &[Surface], origin: DVec3, direction: DVec3) -> Option<Hit> {
     nearest
 }
 
-/// What a camera sees in the direction of a pixel. Its ray has z = 1, so the distance is the depth.
-fn look(surfaces: &[Surface], camera: &Camera, pixel: DVec2) -> Option<Hit> {
+/// The intersection of a pixel's ray. The ray has z = 1 in the camera frame, so that the distance is the
+/// depth.
+fn cast_pixel(surfaces: &[Surface], camera: &Camera, pixel: DVec2) -> Option<Hit> {
     cast(surfaces, camera.center(), camera.rotation.transpose() * camera.ray(pixel))
 }
 
 impl Procedural {
-    /// Photographs the surfaces.
+    /// Renders the surfaces with these cameras.
     pub fn new(surfaces: Vec<Surface>, cameras: &[Camera]) -> Procedural {
         let views = cameras.iter().enumerate().map(|(index, camera)| View {
             name: format!("view{index}.png"),
-            picture: photograph(&surfaces, camera),
+            picture: render(&surfaces, camera),
             camera: *camera,
             mask: None,
             depth_range: None,
             sources: None,
         });
         let truth = cameras.iter().map(|camera| truth(&surfaces, camera)).collect();
-        let mut made = Procedural { views: views.collect(), points: Vec::new(), truth, surfaces };
-        made.points = made.sparse_points();
-        made
+        let mut scene = Procedural { views: views.collect(), points: Vec::new(), truth, surfaces };
+        scene.points = scene.sparse_points();
+        scene
     }
 
-    /// The checked scene.
+    /// The scene, for the library.
     pub fn scene(&self) -> Scene {
-        Scene::new(self.views.clone(), self.points.clone()).expect("a procedural scene is in order")
+        Scene::new(self.views.clone(), self.points.clone()).expect("a procedural scene is valid")
     }
 
-    /// The scene with only these views, in this order.
+    /// The scene reduced to these views, in this order.
     pub fn only(&self, kept: &[usize]) -> Procedural {
-        let place = |view: &u32| kept.iter().position(|&k| k == *view as usize).map(|place| place as u32);
+        let new_index = |view: &u32| kept.iter().position(|&k| k == *view as usize).map(|index| index as u32);
         let points = self.points.iter().map(|point| SparsePoint {
             position: point.position,
-            views: point.views.iter().filter_map(place).collect(),
+            views: point.views.iter().filter_map(new_index).collect(),
         });
         Procedural {
             surfaces: self.surfaces.clone(),
@@ -158,12 +160,12 @@ impl Procedural {
         }
     }
 
-    /// The scene with noise of this deviation on every pixel, other in every view.
+    /// Adds noise of this deviation, in gray values, independent for each view and pixel.
     pub fn with_noise(mut self, deviation: f64) -> Procedural {
         for (index, view) in self.views.iter_mut().enumerate() {
             let (width, height) = (view.camera.width, view.camera.height);
             let noisy = |pixel: usize| {
-                // The sum of twelve is normally distributed, near enough.
+                // The sum of twelve uniform values is nearly normally distributed, with variance 1.
                 let draw = |octave| lattice_value(DVec3::new(index as f64, pixel as f64, -7.0), octave);
                 let offset = deviation * ((100..112).map(draw).sum::<f64>() - 6.0);
                 view.picture.rgb(pixel).map(|channel| (f64::from(channel) + offset).round() as u8)
@@ -174,24 +176,25 @@ impl Procedural {
         self
     }
 
-    /// What is seen at the center of a pixel.
+    /// The intersection of the ray through the center of a pixel.
     pub fn hit(&self, view: usize, pixel: usize) -> Option<Hit> {
         let camera = &self.views[view].camera;
-        look(&self.surfaces, camera, pixel_center(camera, pixel))
+        cast_pixel(&self.surfaces, camera, pixel_center(camera, pixel))
     }
 
-    /// Whether a point of a surface is inside a view's image with nothing before it.
+    /// Whether a point of a surface is inside a view's image and not occluded.
     pub fn is_visible(&self, position: DVec3, view: usize) -> bool {
         let camera = &self.views[view].camera;
         let Some((pixel, depth)) = camera.project(position) else { return false };
         camera.nearest_pixel(pixel).is_some()
-            && look(&self.surfaces, camera, pixel).is_some_and(|hit| hit.distance > depth * (1.0 - 1e-6))
+            && cast_pixel(&self.surfaces, camera, pixel)
+                .is_some_and(|hit| hit.distance > depth * (1.0 - 1e-6))
     }
 
     fn sparse_points(&self) -> Vec<SparsePoint> {
         let mut points = Vec::new();
         for (view, View { camera, .. }) in self.views.iter().enumerate() {
-            // Views start on different rows and columns, so that their points are not the same.
+            // Views start at different rows and columns, so that their points differ.
             for row in (view % POINT_STEP..camera.height as usize).step_by(POINT_STEP) {
                 for column in (view % POINT_STEP..camera.width as usize).step_by(POINT_STEP) {
                     let Some(hit) = self.hit(view, row * camera.width as usize + column) else { continue };
@@ -216,7 +219,7 @@ pub fn pixel_center(camera: &Camera, pixel: usize) -> DVec2 {
     DVec2::new((pixel % width) as f64, (pixel / width) as f64)
 }
 
-/// A camera at `position` that looks at `target`, with the world's y downwards.
+/// A camera at `position` that looks at `target`, with the y axis of the world downwards.
 pub fn looking_at(position: DVec3, target: DVec3, (width, height): (u32, u32), focal: f64) -> Camera {
     let forward = (target - position).normalize();
     let right = DVec3::Y.cross(forward).normalize();
@@ -233,18 +236,18 @@ pub fn looking_at(position: DVec3, target: DVec3, (width, height): (u32, u32), f
     }
 }
 
-/// Nine cameras around the origin in three rows: most pairs see it under an angle of 10 to 30 degrees.
+/// Nine cameras around the origin in three rows: most pairs have a triangulation angle of 10 to 30 degrees.
 pub fn cameras() -> Vec<Camera> {
     let camera = |index: u32| {
         let yaw = (14.0 * (f64::from(index % 3) - 1.0)).to_radians();
         let pitch = (12.0 * (f64::from(index / 3) - 1.0)).to_radians();
-        let towards = DVec3::new(yaw.sin() * pitch.cos(), pitch.sin(), -yaw.cos() * pitch.cos());
-        looking_at(towards * DISTANCE, DVec3::ZERO, SIZE, FOCAL)
+        let direction = DVec3::new(yaw.sin() * pitch.cos(), pitch.sin(), -yaw.cos() * pitch.cos());
+        looking_at(direction * DISTANCE, DVec3::ZERO, SIZE, FOCAL)
     };
     (0..9).map(camera).collect()
 }
 
-/// The one that all others surround.
+/// Index of the camera in the middle.
 pub const MIDDLE: usize = 4;
 
 /// A slanted wall that fills every image.
@@ -276,14 +279,14 @@ pub fn textureless_panel() -> Procedural {
     let wall = wall(Texture::Noise);
     let Shape::Rectangle { center, right, down, .. } = wall.shape else { unreachable!() };
     let shape = Shape::Rectangle { center, right, down, half_size: DVec2::new(0.55, 0.4) };
-    // Listed first, so that rays meet the panel, which lies in the wall.
+    // First in the list, so that rays hit the panel, which lies in the wall.
     Procedural::new(vec![Surface { shape, texture: Texture::Uniform }, wall], &cameras())
 }
 
 fn truth(surfaces: &[Surface], camera: &Camera) -> Maps {
     let mut maps = Maps::default();
     for pixel in 0..camera.pixels() {
-        let hit = look(surfaces, camera, pixel_center(camera, pixel));
+        let hit = cast_pixel(surfaces, camera, pixel_center(camera, pixel));
         let normal = hit.map_or(DVec3::ZERO, |hit| camera.rotation * hit.normal);
         maps.depth.push(hit.map_or(0.0, |hit| hit.distance as f32));
         maps.normal.push(normal.as_vec3().to_array());
@@ -291,7 +294,7 @@ fn truth(surfaces: &[Surface], camera: &Camera) -> Maps {
     maps
 }
 
-fn photograph(surfaces: &[Surface], camera: &Camera) -> Picture {
+fn render(surfaces: &[Surface], camera: &Camera) -> Picture {
     let step = 1.0 / f64::from(SUPERSAMPLES);
     let color = |pixel: usize| {
         let center = pixel_center(camera, pixel);
@@ -299,8 +302,8 @@ fn photograph(surfaces: &[Surface], camera: &Camera) -> Picture {
         for sample in 0..SUPERSAMPLES * SUPERSAMPLES {
             let (column, row) = (f64::from(sample % SUPERSAMPLES), f64::from(sample / SUPERSAMPLES));
             let offset = (DVec2::new(column, row) + 0.5) * step - 0.5;
-            sum +=
-                look(surfaces, camera, center + offset).map_or(DVec3::ZERO, |hit| color_of(surfaces, &hit));
+            sum += cast_pixel(surfaces, camera, center + offset)
+                .map_or(DVec3::ZERO, |hit| color_of(surfaces, &hit));
         }
         (sum * step * step * 255.0).round().to_array().map(|channel| channel as u8)
     };
@@ -319,13 +322,14 @@ fn color_of(surfaces: &[Surface], hit: &Hit) -> DVec3 {
     }
 }
 
-/// Longest wavelength of the noise in world units: 16 pixels of the standard scenes; the shortest are 2 pixels.
+/// Longest wavelength of the noise in world units: 16 pixels of the standard scenes; the shortest are 2
+/// pixels.
 const WAVELENGTH: f64 = 0.5;
 const OCTAVES: u32 = 4;
 
 /// Sum of octaves of value noise, 0 to 1.
 fn noise(position: DVec3) -> f64 {
-    // Turned and moved, so that no surface runs along the lattice.
+    // Rotated and translated, so that no surface is aligned with the lattice.
     let turned = DMat3::from_rotation_x(0.7) * DMat3::from_rotation_y(1.1) * position + DVec3::splat(37.3);
     let (mut sum, mut weights) = (0.0, 0.0);
     for octave in 0..OCTAVES {
@@ -333,7 +337,7 @@ fn noise(position: DVec3) -> f64 {
         sum += weight * value_noise(turned * (f64::from(1 << octave) / WAVELENGTH), octave);
         weights += weight;
     }
-    // The mean of octaves stays near one half: spread it out.
+    // The mean of octaves is close to one half: increase the contrast.
     ((sum / weights - 0.5) * 1.8 + 0.5).clamp(0.0, 1.0)
 }
 
@@ -350,10 +354,10 @@ fn value_noise(position: DVec3, octave: u32) -> f64 {
     sum
 }
 
-/// A number from 0 to 1 that looks random, the same for the same place.
-fn lattice_value(place: DVec3, octave: u32) -> f64 {
+/// A pseudo-random number in [0, 1), a function of the position.
+fn lattice_value(position: DVec3, octave: u32) -> f64 {
     let mut hash = u64::from(octave);
-    for coordinate in place.to_array() {
+    for coordinate in position.to_array() {
         hash = (hash ^ coordinate as i64 as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         hash ^= hash >> 29;
     }
