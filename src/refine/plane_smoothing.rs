@@ -142,9 +142,7 @@ impl PlaneMaps {
         sums
     }
 
-    /// Adds the neighbors at an offset to the sums of a row. Not inlined: within the loops over the offsets the compiler does
-    /// not vectorize it.
-    #[inline(never)]
+    /// Adds the neighbors at an offset to the sums of a row.
     fn add_neighbors(&self, sums: &mut RowSums, y: usize, offset: Offset) {
         let width = sums.weight.len();
         let center = self.inverse_depth.row(y, (0, 0), width);

@@ -36,6 +36,8 @@ impl PaddedMap {
     }
 
     /// `width` values of row `y + dy` from column `dx` on; offsets are limited to the width of the border.
+    // Inlined, so that loops over several rows see that all have the same length, and are vectorized.
+    #[inline(always)]
     pub fn row(&self, y: usize, (dx, dy): Offset, width: usize) -> &[f32] {
         let row = (y + self.border).wrapping_add_signed(dy as isize);
         &self.values[row * self.stride + self.border.wrapping_add_signed(dx as isize)..][..width]
