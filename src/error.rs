@@ -1,4 +1,4 @@
-//! What can go wrong, in words that say what would have been right.
+//! The error type: what was wrong, and what was expected.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -7,13 +7,13 @@ use std::path::PathBuf;
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Error {
-    /// A value handed in cannot be used.
+    /// An argument is wrong.
     Argument {
-        /// What was handed in, for example `views[3].camera.fx`.
+        /// The argument, for example `views[3].camera.fx`.
         name: String,
-        /// The value as it was read.
+        /// Its value.
         value: String,
-        /// What would have been right.
+        /// What was expected instead.
         expected: String,
     },
     /// A file cannot be read, understood or written.
@@ -22,10 +22,10 @@ pub enum Error {
         path: PathBuf,
         /// The line, counted from 1, when the file is text.
         line: Option<usize>,
-        /// What is wrong and what would have been right.
+        /// What is wrong and what was expected.
         problem: String,
     },
-    /// The progress hook asked to stop. Nothing that was finished is lost.
+    /// The progress function returned `Break`.
     Cancelled,
 }
 
@@ -33,7 +33,7 @@ pub enum Error {
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
-    /// A value handed in cannot be used; `expected` says what would have been right.
+    /// An argument is wrong; `expected` says what would have been right.
     pub fn argument(name: impl Into<String>, value: impl fmt::Display, expected: impl Into<String>) -> Self {
         Error::Argument { name: name.into(), value: value.to_string(), expected: expected.into() }
     }

@@ -1,8 +1,9 @@
-//! skep turns calibrated photographs into depth, normal and source-view maps and a fused point cloud: dense multi-view
-//! stereo on the CPU.
+//! skep turns calibrated photographs into depth, normal and source-view maps and a fused point cloud: dense
+//! multi-view stereo on the CPU.
 //!
-//! It implements "Visibility-Aware Pixelwise View Selection for Multi-View Stereo Matching" (Huang et al.) with an
-//! Artificial Multi-Bee Colony search. [`how_it_works`] explains the method with its formulas, [`architecture`] the source.
+//! It implements "Visibility-Aware Pixelwise View Selection for Multi-View Stereo Matching" (Huang et al.)
+//! with an Artificial Multi-Bee Colony search. [`how_it_works`] explains the method with its formulas,
+//! [`architecture`] the source.
 //!
 #![doc = include_str!("../docs/pipeline.svg")]
 //!
@@ -10,13 +11,15 @@
 //!
 //! They can be mixed; each has a program in `examples/rust/`.
 //!
-//! **A whole run** ([`reconstruct`]) takes a [`Scene`] and [`Options`] and gives maps of all views and a cloud:
+//! **A whole run** ([`reconstruct`]) takes a [`Scene`] and [`Options`] and gives maps of all views and a
+//! cloud:
 //!
 //! ```no_run
 //! use skep::{Options, PixelStatus, Progress};
 //! use std::ops::ControlFlow;
 //!
-//! let scene = skep::io::read_scene("SCENE".as_ref(), None)?; // or Scene::new from pictures and cameras in memory
+//! // Or Scene::new from pictures and cameras in memory.
+//! let scene = skep::io::read_scene("SCENE".as_ref(), None)?;
 //! let mut options = Options::default();
 //! options.check.min_consistent_views = 3;
 //! let progress = |at: &Progress| {
@@ -32,8 +35,9 @@
 //! # Ok::<(), skep::Error>(())
 //! ```
 //!
-//! **A run taken apart** ([`Stepper`]) searches, checks and finishes single views, for a host that schedules them itself, on
-//! one machine or many, or that brings maps of its own. It gives the same bits as [`reconstruct`]:
+//! **A run taken apart** ([`Stepper`]) searches, checks and finishes single views, for a host that schedules
+//! them itself, on one machine or many, or that brings maps of its own. It gives the same bits as
+//! [`reconstruct`]:
 //!
 //! ```ignore
 //! use skep::{Checked, Options, Scene, Searched, Stepper, ViewEstimate, ViewResult, ignore_progress};
@@ -57,7 +61,8 @@
 //!             let candidates = stepper.propagate(cycle, view, &before)?;
 //!             stepper.search(cycle, view, &before, Some(&candidates), &ignore_progress)
 //!         };
-//!         let searched: Vec<ViewEstimate<Searched>> = (0..stepper.views()).map(search).collect::<skep::Result<_>>()?;
+//!         let searched: Vec<ViewEstimate<Searched>> =
+//!             (0..stepper.views()).map(search).collect::<skep::Result<_>>()?;
 //!         let found: Vec<_> = searched.iter().map(|found| Some(found.into())).collect();
 //!         let check = |own| stepper.check(cycle, own, &found);
 //!         estimates = searched.iter().map(check).collect::<skep::Result<_>>()?;
@@ -68,8 +73,8 @@
 //! }
 //! ```
 //!
-//! **The kernels** ([`matching`], [`geometry`], [`image`], [`simd`]) are stateless: plane-induced homographies and
-//! bilaterally weighted normalized cross-correlation, generic over the instruction set:
+//! **The kernels** ([`matching`], [`geometry`], [`image`], [`simd`]) are stateless: plane-induced
+//! homographies and bilaterally weighted normalized cross-correlation, generic over the instruction set:
 //!
 //! ```
 //! use glam::{DMat3, DVec3, Vec3};
@@ -94,8 +99,8 @@
 //!
 //!     fn run<S: Simd>(self, simd: S) -> f32 {
 //!         let (rotation, translation) = (DMat3::IDENTITY, DVec3::ZERO);
-//!         let left =
-//!             Camera { width: 64, height: 48, fx: 50.0, fy: 50.0, cx: 31.5, cy: 23.5, rotation, translation };
+//!         let (fx, fy, cx, cy) = (50.0, 50.0, 31.5, 23.5);
+//!         let left = Camera { width: 64, height: 48, fx, fy, cx, cy, rotation, translation };
 //!         let right = Camera { translation: DVec3::new(-0.4, 0.0, 0.0), ..left };
 //!         let pose = RelativePose::new(&left, &right);
 //!         let ray = left.ray((32.0, 24.0).into()).as_vec3();
@@ -120,22 +125,25 @@
 //!
 //! # Conventions
 //!
-//! `x_cam = R * X_world + t`, x right, y down, z forward. The center of the top-left pixel is (0, 0). Depth is z in the
-//! camera frame, 0 where there is none. Normals are unit, in the camera frame of their view, and face the camera. Lenses must
-//! be undistorted: [`geometry::Camera`] is a pinhole. Vectors and matrices of the API are those of glam 0.34.
+//! `x_cam = R * X_world + t`, x right, y down, z forward. The center of the top-left pixel is (0, 0). Depth
+//! is z in the camera frame, 0 where there is none. Normals are unit, in the camera frame of their view, and
+//! face the camera. Lenses must be undistorted: [`geometry::Camera`] is a pinhole. Vectors and matrices of
+//! the API are those of glam 0.34.
 //!
 //! # Threads
 //!
-//! [`reconstruct`] makes a thread pool of its own ([`Options::threads`]) and joins it before it returns; it may be called from
-//! several threads at once. Stepwise calls and [`fusion::fuse`] run on the rayon pool on which they are called. All types are
-//! `Send` and `Sync`; there is no global state. The result does not depend on the number of threads, nor on the SIMD level:
-//! the same scene, options and version give the same bits. A progress function may be called from any worker thread, several
-//! calls at a time, and cancels by returning `Break`.
+//! [`reconstruct`] makes a thread pool of its own ([`Options::threads`]) and joins it before it returns; it
+//! may be called from several threads at once. Stepwise calls and [`fusion::fuse`] run on the rayon pool on
+//! which they are called. All types are `Send` and `Sync`; there is no global state. The result does not
+//! depend on the number of threads, nor on the SIMD level: the same scene, options and version give the same
+//! bits. A progress function may be called from any worker thread, several calls at a time, and cancels by
+//! returning `Break`.
 //!
 //! # Errors
 //!
-//! Every fallible call returns [`Error`], which names the argument or file, its value and what was expected. Nothing is
-//! printed. No input makes the crate panic; a pixel without a depth is no error, it has a [`PixelStatus`].
+//! Every fallible call returns [`Error`], which names the argument or file, its value and what was expected.
+//! Nothing is printed. No input makes the crate panic; a pixel without a depth is no error, it has a
+//! [`PixelStatus`].
 //!
 //! # Features
 //!
@@ -149,12 +157,13 @@
 //!
 //! # Limits
 //!
-//! - Rust 1.95 or newer. AVX2 is detected at run time on x86-64; elsewhere the kernels use the baseline of the target (NEON,
-//!   wasm simd128, SSE2) or scalar code. `SKEP_SIMD=scalar|baseline|v3` forces a level.
-//! - Pinhole cameras without distortion, images up to 32,768 pixels a side, 8 bits a channel (16 are rounded). Matching uses
-//!   the gray values.
+//! - Rust 1.95 or newer. AVX2 is detected at run time on x86-64; elsewhere the kernels use the baseline of
+//!   the target (NEON, wasm simd128, SSE2) or scalar code. `SKEP_SIMD=scalar|baseline|v3` forces a level.
+//! - Pinhole cameras without distortion, images up to 32,768 pixels a side, 8 bits a channel (16 are
+//!   rounded). Matching uses the gray values.
 //! - The maps of all views are in memory during a whole run; [`Stepper`] lets a host keep them elsewhere.
-//! - Two views are the least; the default validates what two other views confirm, and fuses what three confirm.
+//! - Two views are the least; the default validates what two other views confirm, and fuses what three
+//!   confirm.
 
 // The library is a guest: it prints nothing and ends no process.
 #![warn(clippy::print_stdout, clippy::print_stderr, clippy::exit)]

@@ -1,7 +1,8 @@
 //! The kernels alone: the cost of a plane over depth at one pixel of a made pair, as a curve.
 //!
-//! `cargo run --release --example kernels`. The pair is a slanted wall with a pattern on it, so that the truth is known: the
-//! curve has its minimum there, and the plane with the true normal costs less than one parallel to the image.
+//! `cargo run --release --example kernels`. The pair is a slanted wall with a pattern on it, so that the
+//! truth is known: the curve has its minimum there, and the plane with the true normal costs less than one
+//! parallel to the image.
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use skep::geometry::{Camera, Plane, RelativePose, SlantedPlane, plane_homography};
@@ -38,7 +39,8 @@ impl Pair {
         let source = Camera { translation: DVec3::new(-0.6, 0.0, 0.0), ..reference };
         let pixel = DVec2::new(PIXEL.0 as f64, PIXEL.1 as f64);
         let wall = Plane::at(&reference, pixel, TRUE_DEPTH, DVec3::new(0.4, 0.1, -1.0).normalize());
-        // Each camera sees the pattern where its ray meets the wall; the source's pixels are taken back to the reference.
+        // Each camera sees the pattern where its ray meets the wall; the source's pixels are taken back to
+        // the reference.
         let back = plane_homography(&reference, &source, &wall).inverse();
         let images = [DMat3::IDENTITY, back].map(|to_reference| {
             let gray = |index: u32| {

@@ -1,7 +1,7 @@
 //! A run taken apart, as a host's scheduler would do it: `cargo run --release --example stepper -- SCENE`.
 //!
-//! Each stage of each view is a call of its own. Here they are made one after the other; all calls of a stage are
-//! independent of each other and may be made on different threads or machines. The result has the bits of
+//! Each stage of each view is a call of its own. Here they are made one after the other; all calls of a stage
+//! are independent of each other and may be made on different threads or machines. The result has the bits of
 //! `skep::reconstruct`.
 
 use skep::fusion::{FusionView, fuse, overlaps};
@@ -52,7 +52,8 @@ fn run(folder: &Path) -> skep::Result<PointCloud> {
     fuse_results(&scene, &options, &results)
 }
 
-/// The estimates as the stepper takes them: one entry for each view; `None` is a view of which nothing is known.
+/// The estimates as the stepper takes them: one entry for each view; `None` is a view of which nothing is
+/// known.
 fn known(estimates: &[ViewEstimate<Checked>]) -> Vec<Option<&ViewEstimate<Checked>>> {
     estimates.iter().map(Some).collect()
 }
@@ -70,7 +71,8 @@ fn run_cycle(
     };
     let estimates: Vec<_> = estimates.into_iter().map(to_this_scale).collect::<skep::Result<_>>()?;
 
-    // A search reads what the previous cycle published of the view's sources; before the first there is nothing.
+    // A search reads what the previous cycle published of the view's sources; before the first there is
+    // nothing.
     let before: Vec<_> = (0..stepper.views()).map(|view| estimates.get(view)).collect();
     let search = |view| {
         let candidates = stepper.propagate(cycle, view, &before)?;

@@ -9,7 +9,7 @@ pub struct PointCloud {
     pub normals: Vec<[f32; 3]>,
     /// Red, green, blue.
     pub colors: Vec<[u8; 3]>,
-    /// The views each point was fused from, as indices into the scene, the first being the one it started in.
+    /// The views each point was fused from, as indices into the scene; first the one it started in.
     pub views: PointViews,
 }
 
@@ -33,7 +33,7 @@ impl PointViews {
         &self.views[start..self.ends[point]]
     }
 
-    /// Lengths of all lists added up.
+    /// Sum of the lengths of all lists.
     pub fn total(&self) -> usize {
         self.views.len()
     }

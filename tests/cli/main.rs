@@ -1,6 +1,7 @@
 //! The command line from outside: what it prints, what it writes, how it ends.
 #![cfg(feature = "cli")]
 
+mod dump;
 mod layouts;
 
 use layouts::{check_cloud, check_maps, map};
@@ -101,7 +102,7 @@ fn files(folder: &Path) -> Vec<(PathBuf, u64)> {
 }
 
 #[test]
-fn info_tells_version_machine_and_every_option_of_both_presets() {
+fn info_tells_version_machine_and_every_option_of_the_presets() {
     let output = skep(&["info"]);
     assert!(output.status.success());
     let printed = text(&output.stdout);
@@ -256,8 +257,8 @@ fn parts_of_the_method_can_be_left_out_quietly() {
     assert_eq!(option("schedule.scales"), schedule);
 }
 
-/// README's first command, on a copy: every promised file with its layout, the report, then the cloud again from the
-/// maps alone.
+/// README's first command, on a copy: every promised file with its layout, the report, then the cloud again
+/// from the maps alone.
 #[test]
 fn the_embedded_scene_end_to_end() {
     let repository = files(&board());
@@ -314,8 +315,9 @@ fn check_report(report: &Value) {
         let sum: u64 = views.iter().map(|view| view[field].as_u64().unwrap()).sum();
         assert_eq!(totals[field], sum, "{field}");
     }
-    for outcomes in [&totals["outcomes"], &views[0]["outcomes"]] {
-        assert_eq!(outcomes.as_object().unwrap().len(), skep::PixelStatus::ALL.len());
+    for part in [totals, &views[0]] {
+        assert_eq!(part["outcomes"].as_object().unwrap().len(), skep::PixelStatus::ALL.len());
+        assert_eq!(part["outcomes"], part["status_counts"]);
     }
     let outcomes = totals["outcomes"].as_object().unwrap().values();
     assert_eq!(totals["pixels"], outcomes.map(|count| count.as_u64().unwrap()).sum::<u64>());
@@ -326,7 +328,7 @@ fn check_report(report: &Value) {
         (&report["version"], &report["preset"]),
         (&env!("CARGO_PKG_VERSION").into(), &"default".into())
     );
-    assert!(["scalar", "base", "v3"].contains(&report["simd"].as_str().unwrap()));
+    assert!(["scalar", "baseline", "v3"].contains(&report["simd"].as_str().unwrap()));
     assert_eq!(report["options"].as_object().unwrap().len(), skep::Options::default().values().count());
     assert!(report["threads"].as_u64() > Some(0) && report["warnings"].is_array());
 }
@@ -350,8 +352,8 @@ fn check_lines(printed: &str) {
     assert!(!printed.contains('\r') && !printed.contains('\u{1b}'), "no bar without a terminal:\n{printed}");
 }
 
-/// Starts a run and sends it a signal once a line of its progress begins with `cue`; gives its exit status and what it
-/// printed after the cue.
+/// Starts a run and sends it a signal once a line of its progress begins with `cue`; gives its exit status
+/// and what it printed after the cue.
 #[cfg(unix)]
 fn interrupted(arguments: &[&str], cue: &str, signal: &str) -> (Option<i32>, String) {
     let mut process = command(arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
