@@ -4,6 +4,13 @@ use std::fmt;
 use std::path::PathBuf;
 
 /// The error of every fallible call of the crate.
+///
+/// # Examples
+/// ```
+/// let error = skep::Options::default().set("check.depth_tolerance", "2").unwrap_err();
+/// assert!(matches!(&error, skep::Error::Argument { value, .. } if value == "2"));
+/// assert!(error.to_string().contains("check.depth_tolerance is 2; expected"));
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Error {

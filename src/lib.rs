@@ -142,8 +142,8 @@
 //! # Errors
 //!
 //! Every fallible call returns [`Error`], which names the argument or file, its value and what was expected.
-//! Nothing is printed. No input makes the crate panic; a pixel without a depth is no error, it has a
-//! [`PixelStatus`].
+//! Nothing is printed. A panic is a bug, except where a section "Panics" names the case. A pixel without a
+//! depth is no error, it has a [`PixelStatus`].
 //!
 //! # Features
 //!

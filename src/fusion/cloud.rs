@@ -14,6 +14,16 @@ pub struct PointCloud {
 }
 
 /// A list of views for each point, in one allocation.
+///
+/// # Examples
+/// ```
+/// let mut views = skep::PointViews::default();
+/// views.push(&[0, 2]);
+/// views.push(&[]);
+/// views.push(&[1]);
+/// assert_eq!((views.len(), views.total()), (3, 3));
+/// assert_eq!(views.get(0), [0, 2]);
+/// ```
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct PointViews {
     ends: Vec<usize>,

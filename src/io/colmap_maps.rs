@@ -18,6 +18,20 @@ pub struct Grid<T> {
 }
 
 /// Writes a depth map: depths in world units, 0 where there is none.
+///
+/// # Examples
+/// ```
+/// use skep::io::{read_depth_map, write_depth_map};
+///
+/// let folder = tempfile::tempdir().unwrap();
+/// let path = folder.path().join("a.jpg.geometric.bin");
+/// write_depth_map(&path, 3, 2, &[1.0, 1.5, 0.0, 1.0, 1.5, 2.0])?;
+/// assert_eq!(read_depth_map(&path)?.values[1], 1.5);
+/// // A map that does not fit its size is refused, and nothing is written.
+/// let error = write_depth_map(&path, 3, 2, &[1.0]).unwrap_err();
+/// assert_eq!(error.to_string(), "depth map is 1 values; expected one for each of 3 x 2 pixels");
+/// # Ok::<(), skep::Error>(())
+/// ```
 pub fn write_depth_map(path: &Path, width: u32, height: u32, depth: &[f32]) -> Result<()> {
     check_length("depth map", width, height, depth.len())?;
     write_map(path, width, height, 1, |_, pixel| depth[pixel])

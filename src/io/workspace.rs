@@ -38,6 +38,16 @@ impl MapKind {
 }
 
 /// A dense folder. Views have the names of the model's images, which may contain folders.
+///
+/// # Examples
+/// ```
+/// use skep::io::{MapKind, Workspace};
+/// use std::path::Path;
+///
+/// let workspace = Workspace::new("dense");
+/// let map = workspace.depth_map("left/1.jpg", MapKind::Validated);
+/// assert_eq!(map, Path::new("dense/stereo/depth_maps/left/1.jpg.geometric.bin"));
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Workspace {
     folder: PathBuf,

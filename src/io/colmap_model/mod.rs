@@ -20,6 +20,15 @@ pub struct ModelImage {
 }
 
 /// A sparse model without distortion.
+///
+/// # Examples
+/// ```no_run
+/// let model = skep::io::ColmapModel::read("SCENE/sparse".as_ref())?;
+/// for image in &model.images {
+///     println!("{} was taken at {}", image.name, image.camera.center());
+/// }
+/// # Ok::<(), skep::Error>(())
+/// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ColmapModel {
     /// The images in the order of the file, which is what consistency graphs and `fused.ply.vis` count along.
