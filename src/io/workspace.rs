@@ -13,8 +13,7 @@ use crate::fusion::PointCloud;
 use crate::geometry::Camera;
 use crate::image::Picture;
 use crate::pipeline::ViewResult;
-use crate::scene::Maps;
-use crate::scene::SparsePoint;
+use crate::scene::{Maps, SparsePoint};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
