@@ -32,7 +32,7 @@ pub struct Totals {
     pub pixels: u64,
     pub status_counts: BTreeMap<&'static str, u64>,
     /// The same as `status_counts`, under the name that tools know.
-    outcomes: BTreeMap<&'static str, u64>,
+    pub outcomes: BTreeMap<&'static str, u64>,
     pub ncc_evaluations: u64,
     pub bilinear_samples: u64,
     pub early_terminations: u64,
