@@ -207,11 +207,15 @@ pub use pipeline::{
 };
 pub use scene::{Maps, PixelStatus, Scene, SparsePoint, View};
 
+/// The method, stage by stage, with its formulas.
+///
 #[doc = include_str!("../docs/matching.svg")]
-#[doc = ""]
+///
 #[doc = include_str!("how_it_works.md")]
 pub mod how_it_works {}
 
+/// The rooms of the source, the data flow and the invariants.
+///
 #[doc = include_str!("../docs/architecture.md")]
 pub mod architecture {}
 
