@@ -149,7 +149,7 @@ impl FileReader {
     pub(super) fn finish(self) -> Result<()> {
         match self.remaining {
             0 => Ok(()),
-            bytes => Err(self.error(format!("{bytes} bytes follow after the end that its counts give"))),
+            bytes => Err(self.error(format!("{bytes} bytes too many, after the end that its counts give"))),
         }
     }
 }
