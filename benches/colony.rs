@@ -32,8 +32,8 @@ fn colony(criterion: &mut Criterion) {
             o.threads = 1;
             o.schedule.scales = vec![scale];
         });
-        let steps = Stepper::new(&scene, &options).unwrap();
-        let search = || steps.search(0, MIDDLE, &[], None, &ignore_progress).unwrap();
+        let stepper = Stepper::new(&scene, &options).unwrap();
+        let search = || stepper.search(0, MIDDLE, &[], None, &ignore_progress).unwrap();
         group.throughput(Throughput::Elements(search().counts().ncc_evaluations));
         group.bench_function(name, |bencher| bencher.iter(|| black_box(search())));
     }

@@ -39,8 +39,9 @@
 //! them itself, on one machine or many, or that brings maps of its own. It gives the same bits as
 //! [`reconstruct`]:
 //!
-//! ```ignore
-//! use skep::{Checked, Options, Scene, Searched, Stepper, ViewEstimate, ViewResult, ignore_progress};
+//! ```
+//! use skep::{Checked, EstimateRef, Options, Scene, Searched, Stepper, ViewEstimate, ViewResult};
+//! use skep::ignore_progress;
 //!
 //! fn reconstruct(scene: &Scene, options: &Options) -> skep::Result<Vec<ViewResult>> {
 //!     let stepper = Stepper::new(scene, options)?;
@@ -63,8 +64,8 @@
 //!         };
 //!         let searched: Vec<ViewEstimate<Searched>> =
 //!             (0..stepper.views()).map(search).collect::<skep::Result<_>>()?;
-//!         let found: Vec<_> = searched.iter().map(|found| Some(found.into())).collect();
-//!         let check = |own| stepper.check(cycle, own, &found);
+//!         let found: Vec<_> = searched.iter().map(|found| Some(EstimateRef::Searched(found))).collect();
+//!         let check = |own| stepper.check(own, &found);
 //!         estimates = searched.iter().map(check).collect::<skep::Result<_>>()?;
 //!         next = stepper.next(cycle, &estimates.iter().map(Some).collect::<Vec<_>>())?;
 //!     }
@@ -202,8 +203,8 @@ pub use options::{
     ScheduleOptions, SearchOptions, ViewSelectionOptions, WindowOptions,
 };
 pub use pipeline::{
-    Candidates, Cycle, CycleRecord, Hook, OwnMaps, Phase, Progress, Reconstruction, Stepper, Verdicts,
-    ViewEstimate, ViewResult, ignore_progress, reconstruct,
+    AnyEstimate, Candidates, Checked, Cycle, CycleRecord, EstimateRef, OwnMaps, Phase, Progress, ProgressFn,
+    Reconstruction, Searched, Stepper, ViewEstimate, ViewResult, ignore_progress, reconstruct,
 };
 pub use scene::{Maps, PixelStatus, Scene, SparsePoint, View};
 

@@ -62,16 +62,16 @@ pub fn normal(camera: &Camera) -> Vec3 {
     wall(camera).normal.as_vec3()
 }
 
-/// The wall at every pixel, each solution consistent with one source and not validated, at a cost of 0.1.
+/// The wall at every pixel, each plane consistent with one source and not validated, at a cost of 0.1.
 pub fn exact(camera: &Camera) -> PlaneMap {
-    let solution = |pixel| PixelEstimate {
+    let plane = |pixel| PixelEstimate {
         depth: depth(camera, pixel),
         normal: normal(camera),
         cost: 0.1.into(),
-        consistent: 1,
+        consistent_views: 1,
         validated: false,
     };
-    PlaneMap { solutions: (0..camera.pixels()).map(solution).collect(), ..PlaneMap::default() }
+    PlaneMap { planes: (0..camera.pixels()).map(plane).collect() }
 }
 
 /// A camera at `x` on a line parallel to the wall's foot, turned so that it sees the same part of the wall.
@@ -120,11 +120,14 @@ impl World {
         problem
     }
 
-    /// The exact maps of all views; the reference's pixels have all sources in their sets.
+    /// The exact planes of all views.
     pub fn exact(&self) -> Vec<PlaneMap> {
-        let mut maps: Vec<PlaneMap> = self.cameras.iter().map(exact).collect();
-        maps[0].sets = ViewSets::full(self.cameras[0].pixels(), self.cameras.len() - 1);
-        maps
+        self.cameras.iter().map(exact).collect()
+    }
+
+    /// View sets of the first view's pixels that hold all sources.
+    pub fn all_views(&self) -> ViewSets {
+        ViewSets::full(self.cameras[0].pixels(), self.cameras.len() - 1)
     }
 }
 

@@ -36,7 +36,7 @@ fn a_panel_that_shows_nothing_but_noise_continues_the_wall_around_it() {
         for (index, (view, truth)) in result.views.iter().zip(&made.truth).enumerate() {
             for pixel in 0..truth.depth.len() {
                 if is_inside_panel(&made, index, pixel) {
-                    let off = (view.estimate.depth[pixel] / truth.depth[pixel] - 1.0).abs();
+                    let off = (view.raw.depth[pixel] / truth.depth[pixel] - 1.0).abs();
                     share.add(view.status[pixel] == PixelStatus::Validated && off < 0.01);
                 }
             }
@@ -68,7 +68,7 @@ fn a_panel_that_shows_nothing_but_noise_continues_the_wall_around_it() {
 fn right_depths(made: &Procedural, options: Options) -> (Share, Share) {
     let result = run(made, options);
     let is_validated = |view: usize, pixel: usize| result.views[view].status[pixel] == PixelStatus::Validated;
-    let maps = || result.views.iter().zip(&made.truth).map(|(view, truth)| (&view.estimate, truth));
+    let maps = || result.views.iter().zip(&made.truth).map(|(view, truth)| (&view.raw, truth));
     let of_validated = share_right(maps(), 0.005, is_validated);
     let count = share_right(maps(), 0.005, |_, _| true).count;
     (Share { count, ..of_validated }, of_validated)
@@ -100,9 +100,9 @@ fn median_errors(made: &Procedural, options: Options) -> (f64, f64) {
     let (mut depths, mut normals) = (Vec::new(), Vec::new());
     for (view, truth) in result.views.iter().zip(&made.truth) {
         for pixel in (0..truth.depth.len()).filter(|&pixel| view.status[pixel] == PixelStatus::Validated) {
-            let off = f64::from(view.estimate.depth[pixel]) / f64::from(truth.depth[pixel]) - 1.0;
+            let off = f64::from(view.raw.depth[pixel]) / f64::from(truth.depth[pixel]) - 1.0;
             depths.push(off.abs());
-            normals.push(normal_error(&view.estimate, truth, pixel));
+            normals.push(normal_error(&view.raw, truth, pixel));
         }
     }
     let median = |mut errors: Vec<f64>| {

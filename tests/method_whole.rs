@@ -28,8 +28,8 @@ fn run(made: &Procedural, options: &Options) -> Reconstruction {
     assert_eq!(result.views.len(), made.views.len());
     for (view, made) in result.views.iter().zip(&made.views) {
         let pixels = made.camera.pixels();
-        assert_eq!(view.estimate.depth.len(), pixels);
-        assert_eq!(view.estimate.normal.len(), pixels);
+        assert_eq!(view.raw.depth.len(), pixels);
+        assert_eq!(view.raw.normal.len(), pixels);
         assert_eq!(view.cost.len(), pixels);
         assert_eq!(view.status.len(), pixels);
     }
@@ -41,7 +41,7 @@ fn share_right_of_estimates(
     result: &Reconstruction,
     chosen: impl Fn(usize, usize) -> bool,
 ) -> f64 {
-    let maps = result.views.iter().map(|view| &view.estimate).zip(&made.truth);
+    let maps = result.views.iter().map(|view| &view.raw).zip(&made.truth);
     share_right(maps, RIGHT, chosen).value()
 }
 
@@ -59,14 +59,14 @@ fn most_pixels_of_a_textured_scene_are_right() {
     let precision =
         share_right_of_estimates(&made, &result, |view, pixel| is_validated(&result, view, pixel));
     assert!(precision > 0.93, "{precision} of the validated pixels are right");
-    let filtered: Vec<Maps> = result.views.iter().map(ViewResult::filtered).collect();
+    let filtered: Vec<Maps> = result.views.iter().map(ViewResult::validated).collect();
     let complete = share_right(filtered.iter().zip(&made.truth), RIGHT, |_, _| true).value();
     assert!(complete > 0.8, "{complete} of all pixels are validated and right");
 
     let mut close_normals = Share::default();
     for (view, truth) in result.views.iter().zip(&made.truth) {
         for pixel in (0..truth.depth.len()).filter(|&pixel| view.status[pixel] == PixelStatus::Validated) {
-            close_normals.add(normal_error(&view.estimate, truth, pixel) < 20.0);
+            close_normals.add(normal_error(&view.raw, truth, pixel) < 20.0);
         }
     }
     assert!(close_normals.value() > 0.75, "{close_normals:?}");
@@ -90,9 +90,9 @@ fn every_pixel_has_a_depth_in_range_a_unit_normal_and_a_reason() {
         let (camera, range) = (&made.views[index].camera, scene.depth_range(index));
         assert_eq!(view.status_counts().iter().sum::<u64>(), camera.pixels() as u64);
         for pixel in 0..camera.pixels() {
-            let depth = f64::from(view.estimate.depth[pixel]);
+            let depth = f64::from(view.raw.depth[pixel]);
             assert!((range.near * 0.999..=range.far * 1.001).contains(&depth), "depth {depth}");
-            let normal = DVec3::from_array(view.estimate.normal[pixel].map(f64::from));
+            let normal = DVec3::from_array(view.raw.normal[pixel].map(f64::from));
             assert!((normal.length() - 1.0).abs() < 1e-3);
             assert!(normal.dot(camera.ray(pixel_center(camera, pixel))) < 0.0, "a normal turns away");
             assert!((0.0..=2.0).contains(&view.cost[pixel]), "cost {}", view.cost[pixel]);
@@ -220,8 +220,8 @@ fn bits(values: &[f32]) -> Vec<u32> {
 
 fn assert_same_bits(one: &Reconstruction, other: &Reconstruction, what: &str) {
     for (a, b) in one.views.iter().zip(&other.views) {
-        assert!(bits(&a.estimate.depth) == bits(&b.estimate.depth), "depths {what}");
-        let (normals, others) = (a.estimate.normal.as_flattened(), b.estimate.normal.as_flattened());
+        assert!(bits(&a.raw.depth) == bits(&b.raw.depth), "depths {what}");
+        let (normals, others) = (a.raw.normal.as_flattened(), b.raw.normal.as_flattened());
         assert!(bits(normals) == bits(others), "normals {what}");
         assert!(bits(&a.cost) == bits(&b.cost), "costs {what}");
         assert!(a.status == b.status, "outcomes {what}");
@@ -281,7 +281,7 @@ fn another_seed_gives_other_bits() {
             }),
         )
         .views[1]
-            .estimate
+            .raw
             .depth
             .clone()
     };
@@ -388,12 +388,12 @@ fn masked_pixels_get_no_estimate_but_serve_other_views() {
         assert_eq!(result.views[0].status[pixel], PixelStatus::Masked);
         let view = &result.views[MIDDLE];
         assert_eq!(view.status[pixel] == PixelStatus::Masked, is_masked(pixel));
-        assert_eq!(view.estimate.depth[pixel] > 0.0, !is_masked(pixel));
+        assert_eq!(view.raw.depth[pixel] > 0.0, !is_masked(pixel));
         if is_masked(pixel) {
-            assert_eq!(view.estimate.normal[pixel], [0.0; 3]);
+            assert_eq!(view.raw.normal[pixel], [0.0; 3]);
         }
     }
-    assert!(result.views[0].estimate.depth.iter().all(|&depth| depth == 0.0));
+    assert!(result.views[0].raw.depth.iter().all(|&depth| depth == 0.0));
     let wanted = share_right_of_estimates(&made, &result, |view, pixel| view == MIDDLE && !is_masked(pixel));
     assert!(wanted > 0.8, "{wanted} of the wanted half is right");
     let others = share_right_of_estimates(&made, &result, |view, _| view != MIDDLE && view != 0);
@@ -410,7 +410,7 @@ fn a_view_s_own_depth_range_is_kept() {
     let range = DepthRange { near: 3.0, far: 4.2 };
     made.views[1].depth_range = Some(range);
     let result = run(&made, &options());
-    let depths = &result.views[1].estimate.depth;
+    let depths = &result.views[1].raw.depth;
     assert!(depths.iter().all(|&depth| (2.999..4.201).contains(&depth)));
     let beyond = |pixel: usize| made.truth[1].depth[pixel] > 4.4;
     let validated =

@@ -1,11 +1,12 @@
-//! A run taken apart: the same bits as the whole, with states that travel as bytes, and maps of the host's own.
+//! A run taken apart: the same bits as the whole run, with estimates that travel as bytes, and maps of the host's own.
 
 mod common;
 
 use common::changed;
 use common::procedural;
 use skep::{
-    Candidates, Error, Options, OwnMaps, Reconstruction, Scale, Scene, Stepper, ViewEstimate, ignore_progress,
+    AnyEstimate, Candidates, Checked, Error, EstimateRef, Options, OwnMaps, Reconstruction, Scale, Scene,
+    Searched, Stepper, ViewEstimate, ignore_progress,
 };
 use std::ops::ControlFlow;
 
@@ -23,50 +24,90 @@ fn scene() -> Scene {
     procedural::plane_and_sphere().only(&[0, 1, 2, 3]).scene()
 }
 
-fn some(states: &[ViewEstimate]) -> Vec<Option<&ViewEstimate>> {
-    states.iter().map(Some).collect()
+fn known<S>(estimates: &[ViewEstimate<S>]) -> Vec<Option<&ViewEstimate<S>>> {
+    estimates.iter().map(Some).collect()
 }
 
-/// One step of all views by hand, the last view first; `travel` is what happens to each state on its way.
-fn step_all(
-    steps: &Stepper,
-    step: usize,
-    states: &[ViewEstimate],
-    travel: &dyn Fn(ViewEstimate) -> ViewEstimate,
-) -> Vec<ViewEstimate> {
-    let search = |view: usize| {
-        let offers = steps.propagate(step, view, &some(states)).unwrap();
-        travel(steps.search(step, view, &some(states), Some(&offers), &ignore_progress).unwrap())
-    };
-    let mut searched: Vec<ViewEstimate> = (0..steps.views()).rev().map(search).collect();
-    searched.reverse();
-    let verdicts: Vec<_> =
-        (0..steps.views()).rev().map(|view| steps.check(step, view, &some(&searched)).unwrap()).collect();
-    for (view, verdicts) in verdicts.iter().rev().enumerate() {
-        steps.mark(view, &mut searched[view], verdicts).unwrap();
+fn sources(estimates: &[ViewEstimate<Searched>]) -> Vec<Option<EstimateRef<'_>>> {
+    estimates.iter().map(|estimate| Some(estimate.into())).collect()
+}
+
+/// What happens to estimates between two calls.
+trait Travel {
+    fn searched(&self, estimate: ViewEstimate<Searched>) -> ViewEstimate<Searched> {
+        estimate
     }
-    searched.into_iter().map(travel).collect()
+
+    fn checked(&self, estimate: ViewEstimate<Checked>) -> ViewEstimate<Checked> {
+        estimate
+    }
 }
 
-fn by_hand(steps: &Stepper, travel: &dyn Fn(ViewEstimate) -> ViewEstimate) -> Vec<ViewEstimate> {
-    let mut states = Vec::new();
-    let mut next = Some(0);
-    while let Some(step) = next {
-        states = step_all(steps, step, &states, travel);
-        next = steps.next(step, &some(&states)).unwrap();
-        if let Some(next) = next.filter(|&next| steps.size(next, 0) != steps.size(step, 0)) {
-            states = (states.iter().enumerate())
-                .map(|(view, state)| travel(steps.upsample(next, view, state).unwrap()))
-                .collect();
+struct InMemory;
+
+impl Travel for InMemory {}
+
+struct AsBytes<'a>(&'a Stepper);
+
+impl Travel for AsBytes<'_> {
+    fn searched(&self, estimate: ViewEstimate<Searched>) -> ViewEstimate<Searched> {
+        let bytes = estimate.to_bytes();
+        assert_eq!(bytes.len(), estimate.byte_len());
+        match AnyEstimate::from_bytes(self.0, &bytes).unwrap() {
+            AnyEstimate::Searched(estimate) => estimate,
+            AnyEstimate::Checked(_) => panic!("it was not checked"),
         }
     }
-    states
+
+    fn checked(&self, estimate: ViewEstimate<Checked>) -> ViewEstimate<Checked> {
+        let bytes = estimate.to_bytes();
+        assert_eq!(bytes.len(), estimate.byte_len());
+        match AnyEstimate::from_bytes(self.0, &bytes).unwrap() {
+            AnyEstimate::Checked(estimate) => estimate,
+            AnyEstimate::Searched(_) => panic!("it was checked"),
+        }
+    }
 }
 
-fn assert_same(steps: &Stepper, states: &[ViewEstimate], whole: &Reconstruction) {
+/// One cycle of all views, the last view first.
+fn run_cycle(
+    stepper: &Stepper,
+    cycle: usize,
+    estimates: &[ViewEstimate<Checked>],
+    travel: &dyn Travel,
+) -> Vec<ViewEstimate<Checked>> {
+    let search = |view: usize| {
+        let candidates = stepper.propagate(cycle, view, &known(estimates)).unwrap();
+        let known = known(estimates);
+        travel.searched(stepper.search(cycle, view, &known, Some(&candidates), &ignore_progress).unwrap())
+    };
+    let mut searched: Vec<_> = (0..stepper.views()).rev().map(search).collect();
+    searched.reverse();
+    let check =
+        |own: &ViewEstimate<Searched>| travel.checked(stepper.check(own, &sources(&searched)).unwrap());
+    let mut checked: Vec<_> = searched.iter().rev().map(check).collect();
+    checked.reverse();
+    checked
+}
+
+fn run(stepper: &Stepper, travel: &dyn Travel) -> Vec<ViewEstimate<Checked>> {
+    let mut estimates = Vec::new();
+    let mut next = Some(0);
+    while let Some(cycle) = next {
+        estimates = run_cycle(stepper, cycle, &estimates, travel);
+        next = stepper.next(cycle, &known(&estimates)).unwrap();
+        if let Some(next) = next.filter(|&next| stepper.size(next, 0) != stepper.size(cycle, 0)) {
+            let upsample = |own: &ViewEstimate<Checked>| travel.checked(stepper.upsample(next, own).unwrap());
+            estimates = estimates.iter().map(upsample).collect();
+        }
+    }
+    estimates
+}
+
+fn assert_same(stepper: &Stepper, estimates: &[ViewEstimate<Checked>], whole: &Reconstruction) {
     for (view, expected) in whole.views.iter().enumerate() {
-        let found = steps.finish(view, &some(states), &ignore_progress).unwrap();
-        assert_eq!(found.estimate, expected.estimate, "maps of view {view}");
+        let found = stepper.finish(view, &known(estimates), &ignore_progress).unwrap();
+        assert_eq!(found.raw, expected.raw, "maps of view {view}");
         assert_eq!(found.status, expected.status);
         assert_eq!(found.cost, expected.cost);
         assert_eq!(found.view_sets, expected.view_sets);
@@ -76,25 +117,24 @@ fn assert_same(steps: &Stepper, states: &[ViewEstimate], whole: &Reconstruction)
 }
 
 #[test]
-fn steps_by_hand_give_the_bits_of_the_whole_run() {
+fn cycles_one_by_one_give_the_bits_of_the_whole_run() {
     let (scene, options) = (scene(), options());
     let whole = skep::reconstruct(&scene, &options, &ignore_progress).unwrap();
     assert!(whole.views[0].status_counts()[0] > 5000);
-    let steps = Stepper::new(&scene, &options).unwrap();
-    assert_same(&steps, &by_hand(&steps, &|state| state), &whole);
-    let travel = |state: ViewEstimate| ViewEstimate::from_bytes(&steps, &state.to_bytes()).unwrap();
-    assert_same(&steps, &by_hand(&steps, &travel), &whole);
+    let stepper = Stepper::new(&scene, &options).unwrap();
+    assert_same(&stepper, &run(&stepper, &InMemory), &whole);
+    assert_same(&stepper, &run(&stepper, &AsBytes(&stepper)), &whole);
 }
 
 #[test]
-fn a_scale_that_has_settled_is_left() {
+fn a_scale_in_which_little_changes_ends_early() {
     let options = changed(options(), |o| {
         o.schedule.min_changed_fraction = 1.0;
     });
-    let steps = Stepper::new(&scene(), &options).unwrap();
-    let cycles: Vec<(u32, u32)> =
-        by_hand(&steps, &|state| state)[0].cycles().iter().map(|c| (c.downscale, c.cycle)).collect();
-    // The first cycle changes every pixel; the second settles, whatever it changes.
+    let stepper = Stepper::new(&scene(), &options).unwrap();
+    let estimates = run(&stepper, &InMemory);
+    let cycles: Vec<(u32, u32)> = estimates[0].cycles().iter().map(|c| (c.downscale, c.cycle)).collect();
+    // The first cycle changes every pixel; after the second the scale ends, whatever it changes.
     assert_eq!(cycles, [(2, 0), (2, 1), (1, 0), (1, 1)]);
 }
 
@@ -105,99 +145,94 @@ fn maps_of_the_host_s_own_validate_and_guide_another_view() {
     let options = changed(options(), |o| {
         o.schedule.scales = vec![options().schedule.scales[1]];
     });
-    let steps = Stepper::new(&scene, &options).unwrap();
+    let stepper = Stepper::new(&scene, &options).unwrap();
     let own = |view: usize| {
         let own = OwnMaps { maps: &made.truth[view], validated: None, cost: None };
-        ViewEstimate::from_maps(&steps, 1, view, &own).unwrap()
+        ViewEstimate::from_maps(&stepper, 1, view, &own).unwrap()
     };
-    let neighbors: Vec<ViewEstimate> = (0..4).map(own).collect();
-    // View 0 knows nothing of itself: all it has is what the others' maps offer and vouch for.
-    let alone = steps.search(1, 0, &[], None, &ignore_progress).unwrap();
-    let states = [None, Some(&neighbors[1]), Some(&neighbors[2]), Some(&neighbors[3])];
-    let helped = steps.search(1, 0, &states, None, &ignore_progress).unwrap();
-    let good = |state: &ViewEstimate| {
-        let truth = made.truth[0].depth.iter().zip(state.maps().depth);
+    let neighbors: Vec<ViewEstimate<Checked>> = (0..4).map(own).collect();
+    // Nothing is known of view 0 but what the others' maps propose and confirm.
+    let alone = stepper.search(1, 0, &[], None, &ignore_progress).unwrap();
+    let others = [None, Some(&neighbors[1]), Some(&neighbors[2]), Some(&neighbors[3])];
+    let guided = stepper.search(1, 0, &others, None, &ignore_progress).unwrap();
+    let good = |estimate: &ViewEstimate<Searched>| {
+        let truth = made.truth[0].depth.iter().zip(estimate.maps().depth);
         truth.filter(|(truth, depth)| (*depth / **truth - 1.0).abs() < 0.01).count()
     };
-    assert!(good(&helped) > good(&alone), "{} with neighbors, {} without", good(&helped), good(&alone));
-    let mut offered = neighbors.clone();
-    let costs: Vec<f32> = helped.cost().collect();
-    offered[0] = ViewEstimate::from_maps(
-        &steps,
-        1,
-        0,
-        &OwnMaps { maps: &helped.maps(), validated: Some(&vec![false; helped.pixels()]), cost: Some(&costs) },
-    )
-    .unwrap();
-    let offers = steps.propagate(1, 0, &some(&offered)).unwrap();
-    let with_offers = steps.search(1, 0, &some(&offered), Some(&offers), &ignore_progress).unwrap();
-    assert!(good(&with_offers) > good(&helped), "{} with offers", good(&with_offers));
+    assert!(good(&guided) > good(&alone), "{} with neighbors, {} without", good(&guided), good(&alone));
+    let refs: Vec<Option<EstimateRef>> = others.iter().map(|other| other.map(EstimateRef::from)).collect();
+    let checked = stepper.check(&guided, &refs).unwrap();
+    assert!(checked.verdicts().filter(|verdict| verdict.1).count() > 3000);
+
+    let costs: Vec<f32> = guided.cost().collect();
+    let none = vec![false; guided.pixels()];
+    let own = OwnMaps { maps: &guided.maps(), validated: Some(&none), cost: Some(&costs) };
+    let mut all = neighbors.clone();
+    all[0] = ViewEstimate::from_maps(&stepper, 1, 0, &own).unwrap();
+    let candidates = stepper.propagate(1, 0, &known(&all)).unwrap();
+    let with_candidates = stepper.search(1, 0, &known(&all), Some(&candidates), &ignore_progress).unwrap();
+    assert!(good(&with_candidates) > good(&guided), "{} with candidates", good(&with_candidates));
 }
 
 #[test]
 fn what_does_not_belong_together_is_refused_by_name() {
-    let steps = Stepper::new(&scene(), &options()).unwrap();
-    let first = step_all(&steps, 0, &[], &|state| state);
+    let stepper = Stepper::new(&scene(), &options()).unwrap();
+    let first = run_cycle(&stepper, 0, &[], &InMemory);
     let message = |error: Error| error.to_string();
-    let search = |step, view, states: &[Option<&ViewEstimate>]| {
-        message(steps.search(step, view, states, None, &ignore_progress).unwrap_err())
+    let search = |cycle, view, estimates: &[Option<&ViewEstimate<Checked>>]| {
+        message(stepper.search(cycle, view, estimates, None, &ignore_progress).unwrap_err())
     };
-    assert!(search(9, 0, &[]).starts_with("step is 9"), "{}", search(9, 0, &[]));
+    assert!(search(9, 0, &[]).starts_with("cycle is 9"), "{}", search(9, 0, &[]));
     assert!(search(0, 4, &[]).starts_with("view is 4"));
-    assert!(search(1, 0, &some(&first)[..2]).starts_with("states is 2 entries"));
+    assert!(search(1, 0, &known(&first)[..2]).starts_with("estimates is 2 entries"));
+    assert!(search(1, 0, &[Some(&first[1]), None, None, None]).starts_with("estimates[0] is that of view 1"));
+    assert!(search(3, 0, &known(&first)).contains("upsampled"));
+    assert!(message(stepper.upsample(1, &first[0]).unwrap_err()).contains("the scale before"));
     assert!(
-        search(1, 0, &[Some(&first[1]), None, None, None]).starts_with("states[0] is the state of view 1")
+        message(stepper.finish(0, &known(&first), &ignore_progress).unwrap_err()).contains("estimates[0]")
     );
-    assert!(search(3, 0, &some(&first)).contains("handed up"));
-    let searched = steps.search(1, 0, &some(&first), None, &ignore_progress).unwrap();
-    let unchecked = [Some(&searched), None, None, None];
-    assert!(search(1, 0, &unchecked).contains("not yet checked"));
-    assert!(message(steps.check(0, 0, &some(&first)).unwrap_err()).starts_with("states[0] is checked"));
-    assert!(message(steps.check(1, 0, &[]).unwrap_err()).starts_with("states[0] is none"));
-    assert!(message(steps.upsample(1, 0, &first[0]).unwrap_err()).contains("the scale before"));
-    assert!(message(steps.upsample(3, 1, &first[0]).unwrap_err()).contains("view 1"));
-    assert!(message(steps.finish(0, &some(&first), &ignore_progress).unwrap_err()).contains("states[0]"));
-    assert!(message(steps.next(0, &unchecked).unwrap_err()).contains("not yet checked"));
-    let mut marked = first[0].clone();
-    let verdicts = steps.check(1, 0, &unchecked).unwrap();
-    assert!(steps.mark(0, &mut marked, &verdicts).is_err());
-    let cancelled = steps.search(0, 0, &[], None, &|_| ControlFlow::Break(()));
+    let searched = stepper.search(1, 0, &known(&first), None, &ignore_progress).unwrap();
+    let check = |sources: &[Option<EstimateRef>]| message(stepper.check(&searched, sources).unwrap_err());
+    assert!(check(&[None]).starts_with("estimates is 1 entries"));
+    assert!(
+        check(&[None, Some((&first[0]).into()), None, None]).starts_with("estimates[1] is that of view 0")
+    );
+    let fine = stepper.upsample(3, &first[1]).unwrap();
+    assert!(check(&[None, Some((&fine).into()), None, None]).contains("on the scale of cycle 1"));
+    let cancelled = stepper.search(0, 0, &[], None, &|_| ControlFlow::Break(()));
     assert_eq!(cancelled.unwrap_err(), Error::Cancelled);
-    let offers = steps.propagate(1, 0, &some(&first)).unwrap();
-    let search = |step, view, offers: &Candidates| {
-        steps.search(step, view, &some(&first), Some(offers), &ignore_progress).map(drop).map_err(message)
+
+    let candidates = stepper.propagate(1, 0, &known(&first)).unwrap();
+    let search = |cycle, view, candidates: &Candidates| {
+        let estimates = known(&first);
+        stepper.search(cycle, view, &estimates, Some(candidates), &ignore_progress).map(drop).map_err(message)
     };
-    assert!(search(1, 0, &offers).is_ok());
-    assert!(search(1, 1, &offers).unwrap_err().starts_with("offers is offers to view 0 for step 1"));
-    assert!(search(0, 0, &offers).unwrap_err().contains("those to view 0 for step 0"));
+    assert!(search(1, 0, &candidates).is_ok());
+    assert!(search(1, 1, &candidates).unwrap_err().starts_with("candidates is those of view 0 in cycle 1"));
+    assert!(search(0, 0, &candidates).unwrap_err().contains("those of view 0 in cycle 0"));
 }
 
 #[test]
-fn damaged_or_foreign_bytes_are_no_state() {
-    let steps = Stepper::new(&scene(), &options()).unwrap();
-    let bytes = steps.search(0, 1, &[], None, &ignore_progress).unwrap().to_bytes();
-    assert!(ViewEstimate::from_bytes(&steps, &bytes).is_ok());
+fn damaged_or_foreign_bytes_are_no_estimate() {
+    let stepper = Stepper::new(&scene(), &options()).unwrap();
+    let read = |bytes: &[u8]| AnyEstimate::from_bytes(&stepper, bytes).map(drop);
+    let bytes = stepper.search(0, 1, &[], None, &ignore_progress).unwrap().to_bytes();
+    assert!(read(&bytes).is_ok());
     for cut in (0..bytes.len()).step_by(bytes.len() / 50 + 1) {
-        assert!(ViewEstimate::from_bytes(&steps, &bytes[..cut]).is_err(), "cut to {cut} bytes");
+        assert!(read(&bytes[..cut]).is_err(), "cut to {cut} bytes");
     }
-    let longer = [&bytes[..], &[0]].concat();
-    assert!(ViewEstimate::from_bytes(&steps, &longer).is_err());
+    assert!(read(&[&bytes[..], &[0]].concat()).is_err());
     for place in 0..80 {
         let mut changed = bytes.clone();
         changed[place] ^= 0x80;
         // Counts may be any number; everything else in the header is checked against the scene.
-        assert!(
-            ViewEstimate::from_bytes(&steps, &changed).is_err() || (56..80).contains(&place),
-            "byte {place}"
-        );
+        assert!(read(&changed).is_err() || (56..80).contains(&place), "byte {place}");
     }
     let mut not_a_number = bytes.clone();
     let depth = bytes.len() - 26 * 64 * 48;
     not_a_number[depth..depth + 4].copy_from_slice(&f32::NAN.to_le_bytes());
-    assert!(
-        ViewEstimate::from_bytes(&steps, &not_a_number).unwrap_err().to_string().contains("column 0, row 0")
-    );
+    assert!(read(&not_a_number).unwrap_err().to_string().contains("column 0, row 0"));
     let other =
         Stepper::new(&procedural::plane_and_sphere().only(&[0, 1]).scene(), &Options::paper()).unwrap();
-    assert!(ViewEstimate::from_bytes(&other, &bytes).is_err());
+    assert!(AnyEstimate::from_bytes(&other, &bytes).is_err());
 }

@@ -5,9 +5,8 @@
 //! `skep::reconstruct`.
 
 use skep::fusion::{FusionView, fuse, overlaps};
-use skep::{
-    Checked, Options, PointCloud, Scene, Searched, Stepper, ViewEstimate, ViewResult, ignore_progress,
-};
+use skep::ignore_progress;
+use skep::{Checked, EstimateRef, Options, PointCloud, Scene, Searched, Stepper, ViewEstimate, ViewResult};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -82,8 +81,8 @@ fn run_cycle(
         (0..stepper.views()).map(search).collect::<skep::Result<_>>()?;
 
     // A check reads what the view's sources have just found: here all searches of the cycle must be done.
-    let found: Vec<_> = searched.iter().map(|found| Some(found.into())).collect();
-    searched.iter().map(|own| stepper.check(cycle, own, &found)).collect()
+    let found: Vec<_> = searched.iter().map(|found| Some(EstimateRef::Searched(found))).collect();
+    searched.iter().map(|own| stepper.check(own, &found)).collect()
 }
 
 fn report(stepper: &Stepper, cycle: usize, estimates: &[ViewEstimate<Checked>]) {
@@ -107,7 +106,7 @@ fn fuse_results(scene: &Scene, options: &Options, results: &[ViewResult]) -> ske
     let views: Vec<FusionView> = (scene.views().iter().zip(results).zip(&overlaps))
         .map(|((view, result), overlap)| FusionView {
             camera: &view.camera,
-            maps: &result.estimate,
+            maps: &result.raw,
             status: Some(&result.status),
             picture: Some(&view.picture),
             overlap,

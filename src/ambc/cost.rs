@@ -1,68 +1,78 @@
 //! Matching cost of a hypothesis over the source views of its pixel (section 5.2 of the paper).
+//!
+//! ```text
+//! cost in a view = (1 - NCC) + geom_consistency_weight * min(e, e_max)^2 / e_max^2
+//! cost           = mean of the k smallest costs over the view set, or their sum / (|S| - 1) with k = 0
+//! ```
+//!
+//! with `e` the relative depth error against the view's validated surface, or the assumed error where there is none. A view
+//! whose image the hypothesis leaves does not count.
 
-use super::aggregation::{InViews, cheaper, seen, sum, sum_of_least};
+use super::aggregation::{GroupCosts, count_visible, rank_of, sum, sum_of_best};
 use super::colony::Colonies;
+use super::counts::Counts;
 use super::food_source::{FoodSource, cost_to_beat};
-use super::smoothness_term::{SmoothnessRules, Surroundings};
-use crate::ambc::Counts;
-use crate::geometry::SlantedPlane;
-use crate::geometry::ViewSets;
-use crate::matching::{Group, Problem, Projections, SourceProjector};
-use crate::matching::{MAX_COST, ReferencePatch, Window, patch_costs};
+use super::smoothness_term::{SmoothnessRules, SmoothnessTerm};
+use crate::geometry::{Position, SlantedPlane, ViewSets};
+use crate::matching::{
+    Group, MAX_COST, Problem, Projections, ReferencePatch, SourceProjector, Window, patch_costs,
+};
 use crate::options::Options;
 use crate::simd::{LANES, Simd};
 use glam::Vec3;
 
 type Lanes = [f32; LANES];
 
-/// How source views' costs become a hypothesis' cost.
+/// The rules of the cost.
 #[derive(Debug, Clone, Copy)]
 pub struct CostRules {
     /// Views whose mean is the cost; 0 takes the sum over all (equation 3 of the paper).
     best_views: usize,
-    /// Hypotheses in fewer views cost infinitely much.
+    /// Hypotheses visible in fewer views cost infinitely much.
     min_views: usize,
-    noise_ratio: f32,
+    /// Ratio of the patch's variance to the image noise under which the patch is textureless.
+    min_texture_to_noise: f32,
     geometric: GeometricRules,
     smoothness: SmoothnessRules,
 }
 
-/// How disagreement with the source views' validated depths is priced: by its square, which leaves hypotheses that nearly
-/// agree to the images, up to a limit, so that a wrong neighbor cannot rule out a good match.
+/// The penalty of disagreement with the source views' validated surfaces, quadratic up to a limit: hypotheses that nearly
+/// agree are left to the images, and a wrong neighbor cannot rule out a good match.
 #[derive(Debug, Clone, Copy)]
 struct GeometricRules {
-    /// Cost of a square of relative disagreement; 0 without the geometric term.
+    /// Cost of a squared relative depth error; 0 turns the term off.
     weight: f32,
-    /// Relative disagreement at which it stops growing.
-    limit: f32,
-    /// Cost where the source has no validated depth.
-    unknown: f32,
+    /// Relative depth error at the limit.
+    max_error: f32,
+    /// Cost where the source view has no validated depth.
+    missing_cost: f32,
 }
 
 impl CostRules {
-    /// The rules of these options; the geometric term needs validated solutions.
+    /// The rules of these options; the geometric term needs published surfaces.
     pub fn new(options: &Options, with_geometric_term: bool) -> CostRules {
-        let weight = if with_geometric_term { options.cost.geom_consistency_weight } else { 0.0 };
-        let max_error = options.cost.geom_consistency_max_error;
-        let missing = options.cost.geom_consistency_missing_error.min(max_error) / max_error;
+        let cost = &options.cost;
+        let weight = if with_geometric_term { cost.geom_consistency_weight } else { 0.0 };
+        let max_error = cost.geom_consistency_max_error;
+        let missing_error = cost.geom_consistency_missing_error.min(max_error) / max_error;
         CostRules {
-            best_views: options.cost.best_views as usize,
+            best_views: cost.best_views as usize,
             min_views: options.min_matched_views(),
-            noise_ratio: options.window.min_texture_to_noise as f32,
+            min_texture_to_noise: options.window.min_texture_to_noise as f32,
             geometric: GeometricRules {
                 weight: (weight / max_error.powi(2)) as f32,
-                limit: max_error as f32,
-                unknown: (weight * missing.powi(2)) as f32,
+                max_error: max_error as f32,
+                missing_cost: (weight * missing_error.powi(2)) as f32,
             },
             smoothness: SmoothnessRules {
-                weight: options.cost.smoothness_weight as f32,
-                depth_scale: options.cost.smoothness_max_depth_error as f32,
-                normal_scale: (1.0 - options.cost.smoothness_max_normal_error.to_radians().cos()) as f32,
+                weight: cost.smoothness_weight as f32,
+                max_depth_error: cost.smoothness_max_depth_error as f32,
+                max_normal_error: (1.0 - cost.smoothness_max_normal_error.to_radians().cos()) as f32,
             },
         }
     }
 
-    /// What a hypothesis of this depth costs in the views of a group by disagreeing with their validated depths.
+    /// The geometric costs of a hypothesis of this depth in the views of a group.
     #[inline(always)]
     fn geometric_costs<S: Simd>(
         &self,
@@ -71,17 +81,17 @@ impl CostRules {
         projections: &Projections,
         depth: f32,
     ) -> Lanes {
-        let GeometricRules { weight, limit, unknown } = self.geometric;
+        let GeometricRules { weight, max_error, missing_cost } = self.geometric;
         if weight == 0.0 {
             return [0.0; LANES];
         }
         let surfaces = group.surfaces(simd, projections);
-        let depth_there = simd.mul(simd.splat(depth), simd.load(&projections.center[2]));
+        let source_depth = simd.mul(simd.splat(depth), simd.load(&projections.center[2]));
         let one = simd.splat(1.0);
-        let difference = simd.sub(simd.mul(depth_there, simd.load(&surfaces.exact)), one);
-        let square = simd.min(simd.mul(difference, difference), simd.splat(limit * limit));
+        let error = simd.sub(simd.mul(source_depth, simd.load(&surfaces.exact)), one);
+        let square = simd.min(simd.mul(error, error), simd.splat(max_error * max_error));
         let known = simd.mul(simd.splat(weight), square);
-        simd.store(simd.select(surfaces.known, known, simd.splat(unknown)))
+        simd.store(simd.select(surfaces.known, known, simd.splat(missing_cost)))
     }
 }
 
@@ -93,19 +103,19 @@ pub struct Evaluator<'a, S: Simd> {
     rules: CostRules,
     patch: ReferencePatch,
     has_texture: bool,
-    is_weak: bool,
+    is_textureless: bool,
     ray: Vec3,
     gray: u8,
     projector: SourceProjector<'a, S>,
     /// One for each group of the pixel's views.
-    views: Vec<InViews>,
-    surroundings: Surroundings,
+    groups: Vec<GroupCosts>,
+    smoothness: SmoothnessTerm,
     /// Work done so far.
     pub counts: Counts,
 }
 
 impl<'a, S: Simd> Evaluator<'a, S> {
-    /// An evaluator that stands at no pixel yet.
+    /// An evaluator without a pixel yet.
     pub fn new(simd: S, problem: &'a Problem<'a>, window: &'a Window, rules: CostRules) -> Evaluator<'a, S> {
         Evaluator {
             simd,
@@ -114,17 +124,17 @@ impl<'a, S: Simd> Evaluator<'a, S> {
             rules,
             patch: ReferencePatch::new(window),
             has_texture: false,
-            is_weak: false,
+            is_textureless: false,
             ray: Vec3::Z,
             gray: 0,
             projector: SourceProjector::new(simd, problem),
-            views: Vec::with_capacity(problem.sources.len().div_ceil(LANES)),
-            surroundings: Surroundings::new(rules.smoothness),
+            groups: Vec::with_capacity(problem.sources.len().div_ceil(LANES)),
+            smoothness: SmoothnessTerm::new(rules.smoothness),
             counts: Counts::default(),
         }
     }
 
-    /// The reference view.
+    /// The reference view and its sources.
     #[inline(always)]
     pub fn problem(&self) -> &'a Problem<'a> {
         self.problem
@@ -136,45 +146,45 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         self.ray
     }
 
-    /// Goes to a pixel and takes the source views of `set` for it.
+    /// Makes this pixel the current one, matched in the source views of `set`.
     #[inline(always)]
-    pub fn go_to(&mut self, x: usize, y: usize, set: &[u32]) {
+    pub fn set_pixel(&mut self, (x, y): Position, set: &[u32]) {
         self.patch.sample(self.simd, self.window, self.problem.image, x, y);
         self.has_texture = self.patch.has_texture(self.window);
         self.gray = self.problem.image.gray(x, y);
         let noise = self.problem.image.noise.variance(self.gray);
-        self.is_weak = self.patch.variance() < self.rules.noise_ratio * noise;
+        self.is_textureless = self.patch.variance() < self.rules.min_texture_to_noise * noise;
         let (x, y) = (x as f32, y as f32);
         self.ray = self.problem.ray(x, y);
         self.projector.set_pixel_and_views(x, y, set);
     }
 
-    /// Lets the planes of the pixel's neighbors have a say.
+    /// Loads the planes of the pixel's neighbors into the smoothness term.
     #[inline(always)]
-    pub fn look_around(&mut self, neighbors: &Colonies, (x, y): (usize, usize)) {
-        self.surroundings.look(self.problem, self.window, neighbors, (x, y));
+    pub fn load_neighbors(&mut self, neighbors: &Colonies, at: Position) {
+        self.smoothness.load_neighbors(self.problem, self.window, neighbors, at);
     }
 
-    /// How alike the pixel and another one look, from 0 to 1: the bilateral weight of their gray values.
+    /// Similarity of the gray values of the current and another pixel, 0 to 1: their bilateral weight.
     #[inline(always)]
-    pub fn likeness(&self, x: usize, y: usize) -> f32 {
-        self.window.likeness(self.gray, self.problem.image.gray(x, y))
+    pub fn gray_similarity(&self, (x, y): Position) -> f32 {
+        self.window.similarity(self.gray, self.problem.image.gray(x, y))
     }
 
-    /// Whether the pixel's patch can be matched.
+    /// Whether the patch has the variance that matching needs.
     #[inline(always)]
     pub fn has_texture(&self) -> bool {
         self.has_texture
     }
 
-    /// Whether the pixel's patch varies no more than noise does: nothing can be learned from matching it.
+    /// Whether the patch is textureless: its variance may be noise alone, and matching it determines nothing.
     #[inline(always)]
-    pub fn is_weak(&self) -> bool {
-        self.is_weak
+    pub fn is_textureless(&self) -> bool {
+        self.is_textureless
     }
 
-    /// The cost of a hypothesis if it is below `bound`, else infinity: costs are not negative, so the sum over views
-    /// stops as soon as it cannot stay below.
+    /// The cost of a hypothesis if it is below `bound`, else infinity: costs are not negative, so the sum over views ends as
+    /// soon as it cannot stay below.
     #[inline(always)]
     pub fn cost(&mut self, food: &FoodSource, bound: f32) -> f32 {
         // A function of its own, also within what is compiled for the instruction set already: it is long, and called from
@@ -182,35 +192,35 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         let cost = self.simd.vectorize(
             #[inline(always)]
             || {
-                self.place(food);
+                self.project(food);
                 match self.rules.best_views {
-                    0 => self.all_views(food, bound),
-                    count => self.best_views(food, bound, count),
+                    0 => self.cost_over_all_views(food, bound),
+                    best => self.cost_over_best_views(food, bound, best),
                 }
             },
         );
         if cost < bound { cost } else { f32::INFINITY }
     }
 
-    /// Puts `trial` in the place of a food source if it is better; `reward` is a bonus on its fitness.
+    /// Replaces a food source by `trial` if that is better, smoothness included; `reward` is a bonus on the trial's fitness.
     #[inline(always)]
-    pub fn challenge(&mut self, food: &mut FoodSource, trial: &FoodSource, reward: f32) -> bool {
+    pub fn replace_if_better(&mut self, food: &mut FoodSource, trial: &FoodSource, reward: f32) -> bool {
         let bound =
-            cost_to_beat(food.cost + self.surroundings.cost(food), reward) - self.surroundings.cost(trial);
+            cost_to_beat(food.cost + self.smoothness.cost(food), reward) - self.smoothness.cost(trial);
         let cost = self.cost(trial, bound);
-        let wins = cost < bound;
-        if wins {
+        let is_better = cost < bound;
+        if is_better {
             *food = FoodSource { cost, ..*trial };
         }
-        wins
+        is_better
     }
 
-    /// Puts the best food source first; its trial count moves with it. Of equals the earlier stays ahead.
+    /// Swaps the best food source to the front, with its trial count. Of equals the earlier stays ahead.
     #[inline(always)]
     pub fn best_first(&self, foods: &mut [FoodSource]) {
         let mut best = (0, f32::INFINITY);
         for (index, food) in foods.iter().enumerate() {
-            let cost = food.cost + self.surroundings.cost(food);
+            let cost = food.cost + self.smoothness.cost(food);
             if cost < best.1 {
                 best = (index, cost);
             }
@@ -221,14 +231,14 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     /// The mean of `1 - NCC` over the views that have the hypothesis in their image: the confidence.
     #[inline(always)]
     pub fn mean_photometric_cost(&mut self, food: &FoodSource) -> f32 {
-        self.place(food);
+        self.project(food);
         let plane = food.plane(self.problem, self.ray);
         let (mut sum, mut count) = (0.0, 0);
-        for group in 0..self.views.len() {
-            self.views[group].least = [0.0; LANES];
+        for group in 0..self.groups.len() {
+            self.groups[group].costs = [0.0; LANES];
             self.add_photometric_costs(&plane, group);
-            let InViews { projections, least } = &self.views[group];
-            for (lane, cost) in least.iter().enumerate() {
+            let GroupCosts { projections, costs } = &self.groups[group];
+            for (lane, cost) in costs.iter().enumerate() {
                 if projections.inside >> lane & 1 != 0 {
                     (sum, count) = (sum + cost, count + 1);
                 }
@@ -237,81 +247,95 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         if count == 0 { MAX_COST } else { sum / count as f32 }
     }
 
-    /// Keeps, for the hypotheses to come, only `count` views, writes them to `set` and gives the cost of this one: the
-    /// views whose validated surfaces agree best with it, or, where too few do, those in which it costs least.
+    /// Keeps only `count` views for the hypotheses to come, writes them to `set` and returns the cost of this one: the views
+    /// whose validated surfaces agree best with it or, where too few do, those in which it costs least.
     #[inline(always)]
-    pub fn focus(&mut self, food: &FoodSource, count: usize, set: &mut [u32]) -> f32 {
-        self.place(food);
-        let unknown = self.rules.geometric.unknown;
-        let agreeing: usize = (self.views.iter())
-            .map(|InViews { projections, least }| {
-                (0..LANES)
-                    .filter(|&lane| projections.inside >> lane & 1 != 0 && least[lane] < unknown)
-                    .count()
-            })
-            .sum();
-        let all = seen(&self.views);
-        let is_matched = all > count && agreeing < count;
-        if is_matched {
-            let plane = food.plane(self.problem, self.ray);
-            for group in 0..self.views.len() {
-                self.add_photometric_costs(&plane, group);
-            }
-        }
-        let kept = all.min(count);
+    pub fn keep_best_views(&mut self, food: &FoodSource, count: usize, set: &mut [u32]) -> f32 {
+        let is_matched = self.rank_views(food, count);
+        let kept = count_visible(&self.groups).min(count);
         if kept >= self.rules.min_views {
-            set.fill(0);
-            for group in 0..self.views.len() {
-                for (lane, &source) in self.projector.groups()[group].sources().iter().enumerate() {
-                    if cheaper(self.simd, &self.views, group, lane) < kept
-                        && self.views[group].projections.inside >> lane & 1 != 0
-                    {
-                        ViewSets::insert_into(set, source);
-                    }
-                }
-            }
-            // What was matched to choose the views is not matched again.
-            for (group, view) in self.projector.groups().iter().zip(&mut self.views) {
-                for (lane, &source) in group.sources().iter().enumerate() {
-                    view.projections.inside &= !(u8::from(!ViewSets::holds(set, source)) << lane);
-                }
-            }
-            self.projector.set_views(set);
+            self.keep(kept, set);
             if self.rules.best_views > 0 && is_matched {
                 let best = self.rules.best_views.min(kept);
-                return sum_of_least(self.simd, &self.views, kept, best) / best as f32;
+                return sum_of_best(self.simd, &self.groups, kept, best) / best as f32;
             }
         }
         self.cost(food, f32::INFINITY)
     }
 
-    /// Finds where a hypothesis falls in the views of the set. A view whose image its center leaves does not count.
+    /// Finds the costs by which the views are ranked: the geometric ones where surfaces of at least `count` views agree, else
+    /// with the photometric ones; whether with them.
     #[inline(always)]
-    fn place(&mut self, food: &FoodSource) {
-        let Evaluator { simd, projector, views, rules, .. } = self;
-        views.clear();
+    fn rank_views(&mut self, food: &FoodSource, count: usize) -> bool {
+        self.project(food);
+        let missing_cost = self.rules.geometric.missing_cost;
+        let agreeing: usize = (self.groups.iter())
+            .map(|GroupCosts { projections, costs }| {
+                let agrees =
+                    |&lane: &usize| projections.inside >> lane & 1 != 0 && costs[lane] < missing_cost;
+                (0..LANES).filter(agrees).count()
+            })
+            .sum();
+        let is_matched = count_visible(&self.groups) > count && agreeing < count;
+        if is_matched {
+            let plane = food.plane(self.problem, self.ray);
+            for group in 0..self.groups.len() {
+                self.add_photometric_costs(&plane, group);
+            }
+        }
+        is_matched
+    }
+
+    /// Keeps the `count` views of lowest rank and writes them to `set`; their costs stay known.
+    #[inline(always)]
+    fn keep(&mut self, count: usize, set: &mut [u32]) {
+        set.fill(0);
+        for group in 0..self.groups.len() {
+            for (lane, &source) in self.projector.groups()[group].sources().iter().enumerate() {
+                if rank_of(self.simd, &self.groups, group, lane) < count
+                    && self.groups[group].projections.inside >> lane & 1 != 0
+                {
+                    ViewSets::insert_into(set, source);
+                }
+            }
+        }
+        // What was matched to rank the views is not matched again.
+        for (group, costs) in self.projector.groups().iter().zip(&mut self.groups) {
+            for (lane, &source) in group.sources().iter().enumerate() {
+                costs.projections.inside &= !(u8::from(!ViewSets::holds(set, source)) << lane);
+            }
+        }
+        self.projector.set_views(set);
+    }
+
+    /// Projects a hypothesis into the views of the set, and finds its geometric costs.
+    #[inline(always)]
+    fn project(&mut self, food: &FoodSource) {
+        let Evaluator { simd, projector, groups, rules, .. } = self;
+        groups.clear();
         for group in projector.groups() {
             let projections = group.project(*simd, food.depth);
-            let least = rules.geometric_costs(*simd, group, &projections, food.depth);
-            views.push(InViews { projections, least });
+            let costs = rules.geometric_costs(*simd, group, &projections, food.depth);
+            groups.push(GroupCosts { projections, costs });
         }
     }
 
-    /// Adds what the hypothesis costs in the views of a group by their images.
+    /// Adds the photometric costs of the hypothesis in the views of a group.
     #[inline(always)]
     fn add_photometric_costs(&mut self, plane: &SlantedPlane, group: usize) {
         if !self.has_texture {
-            self.views[group].least.iter_mut().for_each(|least| *least += MAX_COST);
+            self.groups[group].costs.iter_mut().for_each(|cost| *cost += MAX_COST);
             return;
         }
         // As `cost`, a function of its own.
         self.simd.vectorize(
             #[inline(always)]
             || {
-                let Evaluator { simd, window, patch, problem, projector, views, .. } = self;
-                let (group, InViews { projections, least }) = (&projector.groups()[group], &mut views[group]);
+                let Evaluator { simd, window, patch, problem, projector, groups, .. } = self;
+                let (group, GroupCosts { projections, costs }) =
+                    (&projector.groups()[group], &mut groups[group]);
                 let slopes = group.slopes(*simd, plane);
-                let costs = patch_costs(
+                let photometric = patch_costs(
                     *simd,
                     window,
                     patch,
@@ -321,37 +345,37 @@ impl<'a, S: Simd> Evaluator<'a, S> {
                     },
                     projections.inside,
                 );
-                for (least, cost) in least.iter_mut().zip(costs) {
-                    *least += cost;
+                for (cost, photometric) in costs.iter_mut().zip(photometric) {
+                    *cost += photometric;
                 }
                 self.counts.ncc_evaluations += u64::from(projections.inside.count_ones());
             },
         );
     }
 
-    /// Equation 3 of the paper: a small set is penalized.
+    /// Equation 3 of the paper: the sum over all views, divided by one less than their number; a small set costs more.
     #[inline(always)]
-    fn all_views(&mut self, food: &FoodSource, bound: f32) -> f32 {
-        let count = seen(&self.views);
+    fn cost_over_all_views(&mut self, food: &FoodSource, bound: f32) -> f32 {
+        let count = count_visible(&self.groups);
         if count <= 1 {
             return f32::INFINITY;
         }
         let plane = food.plane(self.problem, self.ray);
         let divisor = (count - 1) as f32;
-        for group in 0..self.views.len() {
-            if sum(self.simd, &self.views) >= bound * divisor {
+        for group in 0..self.groups.len() {
+            if sum(self.simd, &self.groups) >= bound * divisor {
                 self.counts.early_terminations += 1;
                 return f32::INFINITY;
             }
             self.add_photometric_costs(&plane, group);
         }
-        sum(self.simd, &self.views) / divisor
+        sum(self.simd, &self.groups) / divisor
     }
 
-    /// The mean over the best views of the set; views that cannot see the point do not raise it.
+    /// The mean over the best views of the set; views in which the point is hidden do not raise it.
     #[inline(always)]
-    fn best_views(&mut self, food: &FoodSource, bound: f32, best: usize) -> f32 {
-        let count = seen(&self.views);
+    fn cost_over_best_views(&mut self, food: &FoodSource, bound: f32, best: usize) -> f32 {
+        let count = count_visible(&self.groups);
         if count < self.rules.min_views {
             return f32::INFINITY;
         }
@@ -359,17 +383,17 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         let best = best.min(count);
         let limit = bound * best as f32;
         let (mut unmatched, is_guided) = (count, self.rules.geometric.weight > 0.0);
-        for group in 0..self.views.len() {
-            // Views that are not matched yet and cost nothing else leave nothing to sum.
+        for group in 0..self.groups.len() {
+            // Views that are not matched yet and have no geometric cost leave nothing to sum.
             if (is_guided || unmatched < best || limit <= 0.0)
-                && sum_of_least(self.simd, &self.views, count, best) >= limit
+                && sum_of_best(self.simd, &self.groups, count, best) >= limit
             {
                 self.counts.early_terminations += 1;
                 return f32::INFINITY;
             }
             self.add_photometric_costs(&plane, group);
-            unmatched -= self.views[group].projections.inside.count_ones() as usize;
+            unmatched -= self.groups[group].projections.inside.count_ones() as usize;
         }
-        sum_of_least(self.simd, &self.views, count, best) / best as f32
+        sum_of_best(self.simd, &self.groups, count, best) / best as f32
     }
 }

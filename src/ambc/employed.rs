@@ -1,4 +1,4 @@
-//! Employed bees: search around the colony's own food sources (section 5.3 of the paper).
+//! Employed bees: perturbation within a colony (section 5.3 of the paper).
 
 use super::cost::Evaluator;
 use super::food_source::FoodSource;
@@ -6,8 +6,8 @@ use super::random::Random;
 use crate::geometry::MIN_FACING;
 use crate::simd::Simd;
 
-/// Perturbs the first `count` food sources towards or away from another one of the colony, `y' = y + R(-1,1) (y_n - y)`, in depth or
-/// in normal with equal chance, and keeps what is better.
+/// Perturbs the first `count` food sources towards or away from another one of the colony, `y' = y + R(-1,1) (y_n - y)`,
+/// in depth or in normal with equal chance, and keeps the better of both.
 #[inline(always)]
 pub fn send<S: Simd>(
     evaluator: &mut Evaluator<S>,
@@ -18,13 +18,12 @@ pub fn send<S: Simd>(
     for index in 0..foods.len().min(count) {
         let other = (index + 1 + random.below(foods.len() - 1)) % foods.len();
         let (food, other) = (foods[index], foods[other]);
-        let trial = perturb(evaluator, &food, &other, random);
-        // No closure around what evaluates: left on its own it would not be compiled for the instruction set.
-        let improved = match trial {
-            Some(trial) => evaluator.challenge(&mut foods[index], &trial, 0.0),
+        // No closure around what evaluates: one that is not inlined is not compiled for the instruction set.
+        let is_improved = match perturb(evaluator, &food, &other, random) {
+            Some(trial) => evaluator.replace_if_better(&mut foods[index], &trial, 0.0),
             None => false,
         };
-        if !improved {
+        if !is_improved {
             foods[index].trials = food.trials.saturating_add(1);
         }
     }
@@ -38,15 +37,15 @@ fn perturb<S: Simd>(
     other: &FoodSource,
     random: &mut Random,
 ) -> Option<FoodSource> {
-    let in_depth = random.below(2) == 0;
+    let is_depth = random.below(2) == 0;
     let amount = random.signed();
-    if in_depth {
-        let problem = evaluator.problem();
-        let depth = problem.range.clamp(food.depth + amount * (other.depth - food.depth));
+    if is_depth {
+        let range = &evaluator.problem().range;
+        let depth = range.clamp(food.depth + amount * (other.depth - food.depth));
         (depth != food.depth).then(|| FoodSource::new(depth, food.normal))
     } else {
         let normal = (food.normal + amount * (other.normal - food.normal)).normalize_or_zero();
-        let valid = normal.dot(evaluator.ray()) < -MIN_FACING && normal != food.normal;
-        valid.then(|| FoodSource::new(food.depth, normal))
+        let is_valid = normal.dot(evaluator.ray()) < -MIN_FACING && normal != food.normal;
+        is_valid.then(|| FoodSource::new(food.depth, normal))
     }
 }

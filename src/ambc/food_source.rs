@@ -1,12 +1,13 @@
-//! Food sources: the hypotheses of a colony.
+//! Food sources: the planes of a colony.
 
 use super::random::Random;
+use super::rules::Perturbation;
 use crate::geometry::{MIN_FACING, PlaneHypothesis, SlantedPlane};
 use crate::matching::Problem;
 use glam::Vec3;
 
-/// A plane at a pixel, with what it costs there. Stored as depth at its pixel and normal: the same plane elsewhere is a
-/// transfer, and keeping to the depth range is exact.
+/// A plane at a pixel and what it costs there. It is stored as depth at its pixel and normal: the same plane at another
+/// pixel is a transfer, and clamping to the depth range is exact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FoodSource {
     /// Depth at the pixel.
@@ -15,21 +16,21 @@ pub struct FoodSource {
     pub normal: Vec3,
     /// Aggregated matching cost; infinite where it cannot be evaluated.
     pub cost: f32,
-    /// Trial count: how often it was tried to be improved in vain.
+    /// Consecutive failed attempts to improve it.
     pub trials: u16,
-    /// Whether the plane comes from a validated solution.
+    /// Whether the plane comes from a validated estimate.
     pub validated: bool,
 }
 
 impl FoodSource {
-    /// A plane not evaluated yet.
+    /// A plane that is not evaluated yet.
     #[inline(always)]
     pub fn new(depth: f32, normal: Vec3) -> FoodSource {
         FoodSource { depth, normal, cost: f32::INFINITY, trials: 0, validated: false }
     }
 
     /// A random plane: uniform in inverse depth within the given part (0 to 1) of the range, and over the visible
-    /// hemisphere (section 5.1).
+    /// hemisphere (section 5.1 of the paper).
     #[inline(always)]
     pub fn random(problem: &Problem, ray: Vec3, random: &mut Random, part: (f32, f32)) -> FoodSource {
         let share = part.0 + (part.1 - part.0) * random.unit();
@@ -39,25 +40,23 @@ impl FoodSource {
         FoodSource::new(depth, random.facing_normal(ray))
     }
 
-    /// A plane near this one: inverse depth within a relative `spread`, normal tilted by up to `tilt` along each axis.
+    /// A plane near this one.
     #[inline(always)]
-    pub fn nearby(
+    pub fn perturbed(
         &self,
         problem: &Problem,
         ray: Vec3,
         random: &mut Random,
-        spread: f32,
-        tilt: f32,
+        perturbation: Perturbation,
     ) -> FoodSource {
-        let depth = problem.range.clamp(self.depth / (1.0 + spread * random.signed()));
-        let tilted = self.normal + tilt * Vec3::new(random.signed(), random.signed(), random.signed());
-        let normal = tilted.normalize_or_zero();
-        let facing = normal.dot(ray) < -MIN_FACING;
-        FoodSource::new(depth, if facing { normal } else { self.normal })
+        let depth = problem.range.clamp(self.depth / (1.0 + perturbation.depth * random.signed()));
+        let offset = Vec3::new(random.signed(), random.signed(), random.signed());
+        let normal = (self.normal + perturbation.normal * offset).normalize_or_zero();
+        let is_facing = normal.dot(ray) < -MIN_FACING;
+        FoodSource::new(depth, if is_facing { normal } else { self.normal })
     }
 
-    /// The food source of a plane about the pixel with this ray, not evaluated yet; `None` where it leaves the depth range
-    /// or turns away from the camera.
+    /// The food source of a plane about the pixel with this ray, not evaluated yet; `None` where it is not usable.
     #[inline(always)]
     pub fn of_plane(problem: &Problem, ray: Vec3, plane: &SlantedPlane) -> Option<FoodSource> {
         let (depth, normal) = plane.depth_and_normal(ray, problem.inverse_focal);
@@ -71,8 +70,7 @@ impl FoodSource {
         SlantedPlane::new(self.depth, self.normal, ray, problem.inverse_focal)
     }
 
-    /// The same plane at the pixel with ray `to`, `offset` pixels away; `None` where it leaves the depth range or turns
-    /// away from the camera.
+    /// The same plane at the pixel with ray `to`, `offset` pixels away; `None` where it is not usable.
     #[inline(always)]
     pub fn transferred(
         &self,
@@ -81,8 +79,7 @@ impl FoodSource {
         to: Vec3,
         offset: (f32, f32),
     ) -> Option<FoodSource> {
-        let inverse_depth = self.plane(problem, from).inverse_depth_at(offset.0, offset.1);
-        let depth = 1.0 / inverse_depth;
+        let depth = 1.0 / self.plane(problem, from).inverse_depth_at(offset.0, offset.1);
         let is_usable = PlaneHypothesis { depth, normal: self.normal }.is_usable(to, &problem.range);
         is_usable.then(|| FoodSource::new(depth, self.normal))
     }
@@ -94,8 +91,8 @@ pub fn fitness(cost: f32) -> f32 {
     1.0 / (1.0 + cost)
 }
 
-/// The cost under which a food source with a fitness `reward` beats one of this cost; the reward counts in this
-/// comparison only and is never stored.
+/// The cost under which a food source with a fitness bonus `reward` beats one of this cost. The reward counts in this
+/// comparison only and is never stored (section 5.6 of the paper).
 #[inline(always)]
 pub fn cost_to_beat(cost: f32, reward: f32) -> f32 {
     let needed = fitness(cost) - reward;
@@ -113,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_reward_lets_a_slightly_dearer_plane_win_and_none_does_not() {
+    fn a_reward_lets_a_plane_of_slightly_higher_cost_win() {
         let bound = cost_to_beat(0.5, 0.05);
         assert!(bound > 0.5);
         assert!((fitness(bound) + 0.05 - fitness(0.5)).abs() < 1e-6);

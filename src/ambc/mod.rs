@@ -1,14 +1,21 @@
 //! The Artificial Multi-Bee Colony search (section 5 of the paper): one colony a pixel, whose food sources are planes.
+//!
+//! A search visits the pixels of one checkerboard color after the other. In each iteration employed bees perturb the food
+//! sources of a colony, onlooker bees bring planes of neighboring colonies, and scout bees replace food sources that do not
+//! improve. The cost of a plane is matched over the pixel's view set ([`matching`](crate::matching)).
 
 mod aggregation;
 mod colony;
+mod confidence;
 mod cost;
 mod counts;
 mod employed;
 mod food_source;
+mod initial_colony;
 mod local_plane;
 mod onlooker;
 mod random;
+mod rules;
 mod scout;
 mod search;
 mod smoothness_term;
@@ -16,9 +23,9 @@ mod smoothness_term;
 mod tests;
 
 pub use colony::Candidate;
+pub use confidence::{Confidence, ConfidenceTask};
 pub use cost::CostRules;
 pub use counts::Counts;
-pub use food_source::FoodSource;
-pub use onlooker::OnlookerRules;
 pub use random::{Random, stream};
-pub use search::{Assessment, Search, assess, band_rows};
+pub use rules::SearchRules;
+pub use search::{Search, SearchResult};

@@ -1,14 +1,15 @@
-//! Onlooker bees: bring the best plane of a neighboring colony (section 5.4 of the paper).
+//! Onlooker bees: planes of neighboring colonies (section 5.4 of the paper).
 
 use super::colony::Colonies;
 use super::cost::Evaluator;
 use super::food_source::FoodSource;
 use super::random::Random;
+use crate::geometry::{Offset, Position};
 use crate::simd::Simd;
 
-/// The neighbors an onlooker may visit, all of the other color: 1, 3 and 5 pixels along the axes, and a knight's move
-/// away.
-pub const OFFSETS: [(i32, i32); 20] = [
+/// The neighbors an onlooker may visit, all of the other checkerboard color: 1, 3 and 5 pixels along the axes, and a
+/// knight's move away.
+pub const OFFSETS: [Offset; 20] = [
     (1, 0),
     (-1, 0),
     (0, 1),
@@ -31,61 +32,65 @@ pub const OFFSETS: [(i32, i32); 20] = [
     (-2, -1),
 ];
 
+/// Relative depth difference up to which two planes of the same normal are the same.
+const SAME_DEPTH: f32 = 1e-6;
+
 /// How onlookers choose.
 #[derive(Debug, Clone, Copy)]
 pub struct OnlookerRules {
-    /// Fitness reward of validated planes (section 5.6).
+    /// Fitness bonus of validated planes (section 5.6 of the paper).
     pub reward: f32,
-    /// Random neighbors of which the one of the cheapest plane is visited; the paper's onlookers take the first.
-    pub draws: u32,
+    /// Random neighbors of which the one of lowest cost is visited; the paper's onlookers visit the first.
+    pub tournament_size: u32,
 }
 
-/// Candidates every food source the best plane of a random neighbor of the other color, transferred to this pixel, and
-/// keeps what is better. A validated plane is rewarded in that comparison (section 5.6).
+/// Tries, for every food source, the best plane of a random neighbor of the other color, transferred to this pixel, and
+/// keeps the better of both. A validated plane has a bonus in that comparison (section 5.6 of the paper).
 #[inline(always)]
 pub fn send<S: Simd>(
     evaluator: &mut Evaluator<S>,
     foods: &mut [FoodSource],
     neighbors: &Colonies,
-    (x, y): (usize, usize),
+    at: Position,
     rules: OnlookerRules,
     random: &mut Random,
 ) {
     for food in foods {
-        let candidate = draw_best(evaluator, neighbors, (x, y), rules.draws, random)
-            .and_then(|(dx, dy)| brought(evaluator, neighbors, (x, y), (dx, dy)))
-            .filter(|candidate| !is_same_plane(food, candidate));
-        let improved = match candidate {
-            Some(candidate) => {
-                evaluator.challenge(food, &candidate, if candidate.validated { rules.reward } else { 0.0 })
+        let trial = best_of_tournament(evaluator, neighbors, at, rules.tournament_size, random)
+            .and_then(|offset| transferred(evaluator, neighbors, at, offset))
+            .filter(|trial| !is_same_plane(food, trial));
+        let is_improved = match trial {
+            Some(trial) => {
+                let reward = if trial.validated { rules.reward } else { 0.0 };
+                evaluator.replace_if_better(food, &trial, reward)
             }
             None => false,
         };
-        if !improved {
+        if !is_improved {
             food.trials = food.trials.saturating_add(1);
         }
     }
 }
 
-/// The offset of the cheapest plane among so many random neighbors; of equals the first. Those that look different are
-/// reckoned dearer: where one surface has more texture than the next, its planes are the cheaper ones on both.
+/// The offset of the neighbor of lowest cost among so many random ones; of equals the first. Different gray values raise
+/// the cost: where one surface has more texture than the next, its planes have the lower costs on both.
 #[inline(always)]
-fn draw_best<S: Simd>(
+fn best_of_tournament<S: Simd>(
     evaluator: &Evaluator<S>,
     colonies: &Colonies,
-    (x, y): (usize, usize),
-    draws: u32,
+    (x, y): Position,
+    tournament_size: u32,
     random: &mut Random,
-) -> Option<(i32, i32)> {
-    let mut best = draw_neighbor(colonies, x, y, random)?;
-    let cost = |(dx, dy): (i32, i32)| {
-        let (x, y) = (x.wrapping_add_signed(dx as isize), y.wrapping_add_signed(dy as isize));
-        let food = colonies.best(x, y);
-        // A neighbor that is masked or was never evaluated has nothing to candidate.
-        if food.depth > 0.0 { food.cost + 1.0 - evaluator.likeness(x, y) } else { f32::INFINITY }
+) -> Option<Offset> {
+    let mut best = random_neighbor(colonies, (x, y), random)?;
+    let cost = |(dx, dy): Offset| {
+        let at = (x.wrapping_add_signed(dx as isize), y.wrapping_add_signed(dy as isize));
+        let food = colonies.best(at);
+        // A neighbor that is masked or was never evaluated has no plane.
+        if food.depth > 0.0 { food.cost + 1.0 - evaluator.gray_similarity(at) } else { f32::INFINITY }
     };
-    for _ in 1..draws {
-        if let Some(other) = draw_neighbor(colonies, x, y, random)
+    for _ in 1..tournament_size {
+        if let Some(other) = random_neighbor(colonies, (x, y), random)
             && cost(other) < cost(best)
         {
             best = other;
@@ -94,28 +99,27 @@ fn draw_best<S: Simd>(
     Some(best)
 }
 
-/// A random offset to a pixel inside the image: at a border the offset is mirrored, in tiny images there may be none.
+/// A random offset to a pixel inside the image: at a border the offset is mirrored; in tiny images there may be none.
 #[inline(always)]
-fn draw_neighbor(colonies: &Colonies, x: usize, y: usize, random: &mut Random) -> Option<(i32, i32)> {
+fn random_neighbor(colonies: &Colonies, (x, y): Position, random: &mut Random) -> Option<Offset> {
     let (dx, dy) = OFFSETS[random.below(OFFSETS.len())];
     let mirrored = |at: usize, offset: i32, size: usize| {
-        let inside = |offset: i32| at.checked_add_signed(offset as isize).is_some_and(|to| to < size);
-        [offset, -offset].into_iter().find(|&offset| inside(offset))
+        let is_inside = |offset: i32| at.checked_add_signed(offset as isize).is_some_and(|to| to < size);
+        [offset, -offset].into_iter().find(|&offset| is_inside(offset))
     };
-    Some((mirrored(x, dx, colonies.width)?, mirrored(y, dy, colonies.height)?))
+    Some((mirrored(x, dx, colonies.grid.width)?, mirrored(y, dy, colonies.grid.height)?))
 }
 
-/// The best plane of the neighbor at this offset, moved to the pixel.
+/// The best plane of the neighbor at this offset, transferred to the pixel.
 #[inline(always)]
-fn brought<S: Simd>(
+fn transferred<S: Simd>(
     evaluator: &Evaluator<S>,
     neighbors: &Colonies,
-    (x, y): (usize, usize),
-    (dx, dy): (i32, i32),
+    (x, y): Position,
+    (dx, dy): Offset,
 ) -> Option<FoodSource> {
     let (nx, ny) = (x.wrapping_add_signed(dx as isize), y.wrapping_add_signed(dy as isize));
-    let best = neighbors.best(nx, ny);
-    // A neighbor that is masked or was never evaluated has nothing to candidate.
+    let best = neighbors.best((nx, ny));
     if best.depth <= 0.0 {
         return None;
     }
@@ -127,5 +131,5 @@ fn brought<S: Simd>(
 
 #[inline(always)]
 fn is_same_plane(a: &FoodSource, b: &FoodSource) -> bool {
-    (a.depth - b.depth).abs() <= 1e-6 * b.depth && a.normal == b.normal
+    (a.depth - b.depth).abs() <= SAME_DEPTH * b.depth && a.normal == b.normal
 }

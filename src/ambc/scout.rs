@@ -1,12 +1,12 @@
-//! Scout bees: search everywhere (section 5.5 of the paper).
+//! Scout bees: random planes (section 5.5 of the paper).
 
 use super::cost::Evaluator;
 use super::food_source::FoodSource;
 use super::random::Random;
 use crate::simd::Simd;
 
-/// Replaces the stalest food source by a random one when its trial count exceeds the limit; never the best, which
-/// stands first.
+/// Replaces the food source of the most failed attempts by a random one when they exceed the limit; never the best one,
+/// which is first.
 #[inline(always)]
 pub fn send<S: Simd>(
     evaluator: &mut Evaluator<S>,

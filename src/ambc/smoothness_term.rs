@@ -1,26 +1,31 @@
-//! Smoothness, beyond the paper: the planes of the neighboring pixels, as far as they are validated and look alike,
-//! say where the surface of a pixel should be.
+//! The smoothness term of the cost, beyond the paper: the validated planes of the four neighbors, weighted by the
+//! similarity of gray values, predict the plane of a pixel; disagreement adds to its cost.
+//!
+//! ```text
+//! cost = weight / 4 * sum over validated neighbors of similarity * min(1, e)^2
+//! e = |d_neighbor / d - 1| / max_depth_error + (1 - n_neighbor . n) / (1 - cos(max_normal_error))
+//! ```
 
 use super::colony::Colonies;
 use super::food_source::FoodSource;
-use crate::matching::Problem;
-use crate::matching::Window;
+use crate::geometry::{Offset, Position};
+use crate::matching::{Problem, Window};
 use glam::Vec3;
 
-/// How disagreement with neighbors is priced: by its square, which leaves planes that nearly agree to the images.
+/// The penalty of disagreement with neighbors, quadratic up to a limit: planes that nearly agree are left to the images.
 #[derive(Debug, Clone, Copy)]
 pub struct SmoothnessRules {
-    /// Cost of disagreeing with all neighbors altogether; 0 without smoothness.
+    /// Cost at the limit against all four neighbors; 0 turns the term off.
     pub weight: f32,
-    /// Relative difference of inverse depths that is altogether.
-    pub depth_scale: f32,
-    /// `1 - cos` of the angle between normals that is altogether.
-    pub normal_scale: f32,
+    /// Relative depth error at the limit.
+    pub max_depth_error: f32,
+    /// `1 - cos` of the angle between normals at the limit.
+    pub max_normal_error: f32,
 }
 
-/// What the neighbors of the pixel at work predict there.
+/// The planes that the neighbors predict for the current pixel.
 #[derive(Debug, Clone)]
-pub struct Surroundings {
+pub struct SmoothnessTerm {
     rules: SmoothnessRules,
     predictions: [Prediction; NEIGHBORS.len()],
     count: usize,
@@ -28,45 +33,42 @@ pub struct Surroundings {
 
 #[derive(Debug, Clone, Copy)]
 struct Prediction {
-    /// Of the neighbor's plane at the pixel.
+    /// Depth of the neighbor's plane at the pixel.
     depth: f32,
     normal: Vec3,
-    /// Its share of the cost.
+    /// Its part of the cost at the limit.
     weight: f32,
 }
 
 /// All of the other color of the checkerboard.
-const NEIGHBORS: [(i32, i32); 4] = [(1, 0), (-1, 0), (0, 1), (0, -1)];
+const NEIGHBORS: [Offset; 4] = [(1, 0), (-1, 0), (0, 1), (0, -1)];
 
-impl Surroundings {
-    /// Without neighbors.
-    pub fn new(rules: SmoothnessRules) -> Surroundings {
+impl SmoothnessTerm {
+    /// A term without neighbors, which costs nothing.
+    pub fn new(rules: SmoothnessRules) -> SmoothnessTerm {
         let none = Prediction { depth: 1.0, normal: Vec3::NEG_Z, weight: 0.0 };
-        Surroundings { rules, predictions: [none; NEIGHBORS.len()], count: 0 }
+        SmoothnessTerm { rules, predictions: [none; NEIGHBORS.len()], count: 0 }
     }
 
-    /// Looks at the best food sources of the neighbors of a pixel.
+    /// Takes the best planes of the neighbors of a pixel as predictions.
     #[inline(always)]
-    pub fn look(&mut self, problem: &Problem, window: &Window, colonies: &Colonies, (x, y): (usize, usize)) {
+    pub fn load_neighbors(&mut self, problem: &Problem, window: &Window, colonies: &Colonies, at: Position) {
         self.count = 0;
         if self.rules.weight == 0.0 {
             return;
         }
-        let to = problem.ray(x as f32, y as f32);
-        let center = problem.image.gray(x, y);
+        let to = problem.ray(at.0 as f32, at.1 as f32);
+        let center = problem.image.gray(at.0, at.1);
         for (dx, dy) in NEIGHBORS {
-            let (nx, ny) = (x.wrapping_add_signed(dx as isize), y.wrapping_add_signed(dy as isize));
-            if nx >= colonies.width || ny >= colonies.height {
-                continue;
-            }
-            let best = colonies.best(nx, ny);
+            let Some((nx, ny)) = colonies.grid.neighbor(at, (dx, dy)) else { continue };
+            let best = colonies.best((nx, ny));
             if !best.validated {
                 continue;
             }
             let from = problem.ray(nx as f32, ny as f32);
             if let Some(moved) = best.transferred(problem, from, to, (-dx as f32, -dy as f32)) {
-                let likeness = window.likeness(center, problem.image.gray(nx, ny));
-                let weight = self.rules.weight * likeness / NEIGHBORS.len() as f32;
+                let similarity = window.similarity(center, problem.image.gray(nx, ny));
+                let weight = self.rules.weight * similarity / NEIGHBORS.len() as f32;
                 self.predictions[self.count] =
                     Prediction { depth: moved.depth, normal: moved.normal, weight };
                 self.count += 1;
@@ -74,15 +76,15 @@ impl Surroundings {
         }
     }
 
-    /// What a food source's disagreement with the neighbors costs.
+    /// The cost of a food source's disagreement with the neighbors.
     #[inline(always)]
     pub fn cost(&self, food: &FoodSource) -> f32 {
         let mut sum = 0.0;
         for prediction in &self.predictions[..self.count] {
-            let depth = (prediction.depth / food.depth - 1.0).abs() / self.rules.depth_scale;
-            let normal = (1.0 - prediction.normal.dot(food.normal)) / self.rules.normal_scale;
-            let disagreement = depth + normal;
-            sum += prediction.weight * if disagreement < 1.0 { disagreement * disagreement } else { 1.0 };
+            let depth = (prediction.depth / food.depth - 1.0).abs() / self.rules.max_depth_error;
+            let normal = (1.0 - prediction.normal.dot(food.normal)) / self.rules.max_normal_error;
+            let error = depth + normal;
+            sum += prediction.weight * if error < 1.0 { error * error } else { 1.0 };
         }
         sum
     }

@@ -15,7 +15,7 @@ pub unsafe extern "C" fn skep_result_borrow_depth(
     guard(|| {
         // SAFETY: as the header demands of the caller.
         let (result, out) = unsafe { (get(result, "result")?, out(depth_out, "depth_out")?) };
-        out.set(result.view(view)?.estimate.depth.as_ptr());
+        out.set(result.view(view)?.raw.depth.as_ptr());
         Ok(())
     })
 }
@@ -31,7 +31,7 @@ pub unsafe extern "C" fn skep_result_borrow_normal(
     guard(|| {
         // SAFETY: as the header demands of the caller.
         let (result, out) = unsafe { (get(result, "result")?, out(normal_out, "normal_out")?) };
-        out.set(result.view(view)?.estimate.normal.as_ptr().cast());
+        out.set(result.view(view)?.raw.normal.as_ptr().cast());
         Ok(())
     })
 }

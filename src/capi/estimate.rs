@@ -4,13 +4,13 @@ use super::maps::{self, Plain};
 use super::pointers::{destroy, get, give_list, out, slice, wanted};
 use super::status::{Failure, guard, skep_status};
 use super::stepper::skep_stepper;
-use crate::pipeline::{OwnMaps, ViewEstimate};
+use crate::pipeline::{AnyEstimate, OwnMaps, ViewEstimate};
 use crate::scene::Maps;
 
 /// What is known of one view after it was searched in a step or, once checked, after the check. Never changes: may be
 /// used from several threads at once.
 pub struct skep_estimate {
-    estimate: ViewEstimate,
+    estimate: AnyEstimate,
 }
 
 /// What a estimate is.
@@ -36,11 +36,11 @@ pub struct skep_estimate_info {
 }
 
 impl skep_estimate {
-    pub fn new(estimate: ViewEstimate) -> skep_estimate {
+    pub fn new(estimate: AnyEstimate) -> skep_estimate {
         skep_estimate { estimate }
     }
 
-    pub fn inner(&self) -> &ViewEstimate {
+    pub fn inner(&self) -> &AnyEstimate {
         &self.estimate
     }
 }
@@ -82,7 +82,7 @@ pub unsafe extern "C" fn skep_estimate_from_maps(
         let validated: Option<Vec<bool>> = validated.map(|map| map.iter().map(|&byte| byte != 0).collect());
         let own = OwnMaps { maps: &maps, validated: validated.as_deref(), cost: cost.as_deref() };
         let make = || ViewEstimate::from_maps(stepper.inner(), cycle as usize, view as usize, &own);
-        out.give(skep_estimate { estimate: stepper.install(make)? });
+        out.give(skep_estimate::new(AnyEstimate::Checked(stepper.install(make)?)));
         Ok(())
     })
 }
@@ -121,11 +121,11 @@ pub unsafe extern "C" fn skep_estimate_get_info(
         out.set(skep_estimate_info {
             view: estimate.view() as u32,
             cycle: estimate.cycle() as u32,
-            is_checked: u32::from(estimate.is_marked()),
+            is_checked: u32::from(estimate.checked().is_some()),
             reserved: 0,
             pixels: estimate.pixels() as u64,
             changed: estimate.cycles().last().map_or(0, |cycle| cycle.changed),
-            validated: estimate.verdicts().filter(|verdict| verdict.1).count() as u64,
+            validated: estimate.validated().iter().filter(|validated| **validated).count() as u64,
             ncc_evaluations: estimate.counts().ncc_evaluations,
         });
         Ok(())
@@ -147,8 +147,8 @@ pub unsafe extern "C" fn skep_estimate_get_maps(
     guard(|| {
         // SAFETY: as the header demands of the caller.
         let estimate = &unsafe { get(estimate, "estimate") }?.estimate;
-        let (maps, costs) = (estimate.maps(), estimate.cost().collect::<Vec<f32>>());
-        let verdicts: Vec<u8> = estimate.verdicts().map(|verdict| u8::from(verdict.1)).collect();
+        let (maps, costs) = (estimate.maps(), estimate.cost());
+        let flags: Vec<u8> = estimate.validated().into_iter().map(u8::from).collect();
         let needed = estimate.pixels();
         // SAFETY: as the header demands of the caller.
         unsafe {
@@ -159,7 +159,7 @@ pub unsafe extern "C" fn skep_estimate_get_maps(
             depth.into_iter().for_each(|out| out.set(&maps.depth));
             normal.into_iter().for_each(|out| out.set(&maps.normal));
             cost.into_iter().for_each(|out| out.set(&costs));
-            validated.into_iter().for_each(|out| out.set(&verdicts));
+            validated.into_iter().for_each(|out| out.set(&flags));
         }
         Ok(())
     })
@@ -204,9 +204,8 @@ pub unsafe extern "C" fn skep_estimate_load(
         let (stepper, bytes, out) = unsafe {
             (get(stepper, "stepper")?, slice(bytes, size, "bytes")?, out(estimate_out, "estimate_out")?)
         };
-        out.give(skep_estimate {
-            estimate: stepper.install(|| ViewEstimate::from_bytes(stepper.inner(), bytes))?,
-        });
+        let load = || AnyEstimate::from_bytes(stepper.inner(), bytes);
+        out.give(skep_estimate::new(stepper.install(load)?));
         Ok(())
     })
 }

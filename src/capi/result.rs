@@ -253,7 +253,7 @@ pub unsafe extern "C" fn skep_result_get_depth(
     stride_bytes: usize,
 ) -> skep_status {
     let depth = |view: &ViewResult, pixel| match is_given(view, pixel, which) {
-        true => view.estimate.depth[pixel],
+        true => view.raw.depth[pixel],
         false => 0.0,
     };
     // SAFETY: as the header demands of the caller.
@@ -271,7 +271,7 @@ pub unsafe extern "C" fn skep_result_get_normal(
     stride_bytes: usize,
 ) -> skep_status {
     let normal = |view: &ViewResult, pixel| match is_given(view, pixel, which) {
-        true => view.estimate.normal[pixel],
+        true => view.raw.normal[pixel],
         false => [0.0; 3],
     };
     let out = out.cast::<[f32; 3]>();

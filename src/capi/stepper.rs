@@ -8,7 +8,7 @@ use super::result::skep_result;
 use super::scene::{no_view, skep_scene};
 use super::status::{Failure, guard, skep_status};
 use crate::parallel::JoinedPool;
-use crate::pipeline::{Candidates, Stepper, ViewEstimate};
+use crate::pipeline::{AnyEstimate, Candidates, Checked, EstimateRef, Stepper, ViewEstimate};
 use std::ffi::c_void;
 
 /// A run taken apart, for hosts that schedule views themselves, on one machine or on many, or that bring maps of their
@@ -62,17 +62,41 @@ impl skep_stepper {
         self.pool.install(work)
     }
 
-    fn estimates<'a>(
-        &self,
+    /// The estimates of an array, `None` where it holds NULL.
+    ///
+    /// # Safety
+    /// Every pointer is NULL or points to an estimate, for `'a`.
+    unsafe fn estimates<'a>(
         estimates: &[*const skep_estimate],
-    ) -> Result<Vec<Option<&'a ViewEstimate>>, Failure> {
-        let place = |(index, &estimate): (usize, &*const skep_estimate)| match estimate.is_null() {
+    ) -> Result<Vec<Option<&'a AnyEstimate>>, Failure> {
+        let estimate = |(index, &estimate): (usize, &*const skep_estimate)| match estimate.is_null() {
             true => Ok(None),
-            // SAFETY: as the header demands of the caller, who holds the estimates during the call.
+            // SAFETY: as promised by the caller.
             false => Ok(Some(unsafe { get(estimate, &format!("estimates[{index}]")) }?.inner())),
         };
-        estimates.iter().enumerate().map(place).collect()
+        estimates.iter().enumerate().map(estimate).collect()
     }
+
+    /// The same of estimates that must be checked.
+    ///
+    /// # Safety
+    /// Every pointer is NULL or points to an estimate, for `'a`.
+    unsafe fn checked<'a>(
+        estimates: &[*const skep_estimate],
+    ) -> Result<Vec<Option<&'a ViewEstimate<Checked>>>, Failure> {
+        // SAFETY: as promised by the caller.
+        let estimates = unsafe { skep_stepper::estimates(estimates) }?;
+        let checked = |(index, estimate): (usize, Option<&'a AnyEstimate>)| {
+            estimate.map(|estimate| require_checked(estimate, &format!("estimates[{index}]"))).transpose()
+        };
+        estimates.into_iter().enumerate().map(checked).collect()
+    }
+}
+
+/// Refuses an estimate that is not checked; `name` is how the error calls it.
+fn require_checked<'a>(estimate: &'a AnyEstimate, name: &str) -> Result<&'a ViewEstimate<Checked>, Failure> {
+    let expected = "one that is checked";
+    estimate.checked().ok_or_else(|| Failure::argument(name, "searched and not checked", expected))
 }
 
 /// Prepares the stepper of a run.
@@ -122,7 +146,7 @@ pub unsafe extern "C" fn skep_stepper_get_count(
         let (cycle_count, view_count) = unsafe {
             (wanted_one(cycle_count_out, "cycle_count_out")?, wanted_one(view_count_out, "view_count_out")?)
         };
-        cycle_count.into_iter().for_each(|out| out.set(stepper.all().len() as u32));
+        cycle_count.into_iter().for_each(|out| out.set(stepper.cycles().len() as u32));
         view_count.into_iter().for_each(|out| out.set(stepper.views() as u32));
         Ok(())
     })
@@ -138,11 +162,15 @@ pub unsafe extern "C" fn skep_stepper_get_cycle(
     guard(|| {
         // SAFETY: as the header demands of the caller.
         let (stepper, out) = unsafe { (&get(stepper, "stepper")?.stepper, out(cycle_out, "cycle_out")?) };
-        let found = stepper.all().get(cycle as usize).ok_or_else(|| {
-            Failure::argument("cycle", cycle, format!("a cycle below their number, {}", stepper.all().len()))
+        let found = stepper.cycles().get(cycle as usize).ok_or_else(|| {
+            Failure::argument(
+                "cycle",
+                cycle,
+                format!("a cycle below their number, {}", stepper.cycles().len()),
+            )
         })?;
         out.set(skep_cycle {
-            downscale: found.downscale(),
+            downscale: found.scale.downscale,
             cycle_on_scale: found.cycle,
             food_sources: found.scale.food_sources,
             iterations: found.iterations(),
@@ -214,7 +242,8 @@ pub unsafe extern "C" fn skep_stepper_propagate(
                 out(candidates_out, "candidates_out")?,
             )
         };
-        let estimates = stepper.estimates(estimates)?;
+        // SAFETY: as the header demands of the caller, who keeps the estimates during the call.
+        let estimates = unsafe { skep_stepper::checked(estimates) }?;
         let propagate = || stepper.stepper.propagate(cycle as usize, view as usize, &estimates);
         out.give(skep_candidates { candidates: stepper.install(propagate)? });
         Ok(())
@@ -260,12 +289,13 @@ pub unsafe extern "C" fn skep_stepper_search(
             // SAFETY: as the header demands of the caller.
             false => Some(&unsafe { get(candidates_or_null, "candidates") }?.candidates),
         };
-        let estimates = stepper.estimates(estimates)?;
+        // SAFETY: as the header demands of the caller, who keeps the estimates during the call.
+        let estimates = unsafe { skep_stepper::checked(estimates) }?;
         let host = Host::new(progress_or_null, user);
         let search = || {
             stepper.stepper.search(cycle as usize, view as usize, &estimates, candidates, &|at| host.tell(at))
         };
-        out.give(skep_estimate::new(stepper.install(search)?));
+        out.give(skep_estimate::new(AnyEstimate::Searched(stepper.install(search)?)));
         Ok(())
     })
 }
@@ -290,19 +320,22 @@ pub unsafe extern "C" fn skep_stepper_check(
                 out(estimate_out, "estimate_out")?,
             )
         };
-        let estimates = stepper.estimates(estimates)?;
-        let check = || -> crate::Result<Option<ViewEstimate>> {
-            let verdicts = stepper.stepper.check(cycle as usize, view as usize, &estimates)?;
-            let mut checked = estimates.get(view as usize).copied().flatten().cloned();
-            checked
-                .iter_mut()
-                .try_for_each(|estimate| stepper.stepper.mark(view as usize, estimate, &verdicts))?;
-            Ok(checked)
-        };
-        // A check without a estimate of the view's own has failed.
-        if let Some(estimate) = stepper.install(check)? {
-            out.give(skep_estimate::new(estimate));
+        // SAFETY: as the header demands of the caller, who keeps the estimates during the call.
+        let estimates = unsafe { skep_stepper::estimates(estimates) }?;
+        stepper.stepper.size(cycle as usize, view as usize)?;
+        let name = format!("estimates[{view}]");
+        let own = estimates.get(view as usize).copied().flatten();
+        let own = own.ok_or_else(|| Failure::argument(&name, "NULL", "the estimate of the view itself"))?;
+        let expected = "one that is searched and not checked";
+        let own = own.searched().ok_or_else(|| Failure::argument(&name, "checked", expected))?;
+        if (own.view(), own.cycle()) != (view as usize, cycle as usize) {
+            let value = format!("that of view {} in cycle {}", own.view(), own.cycle());
+            return Err(Failure::argument(&name, value, format!("that of view {view} in cycle {cycle}")));
         }
+        let sources: Vec<Option<EstimateRef>> =
+            estimates.iter().map(|estimate| estimate.map(EstimateRef::from)).collect();
+        let checked = stepper.install(|| stepper.stepper.check(own, &sources))?;
+        out.give(skep_estimate::new(AnyEstimate::Checked(checked)));
         Ok(())
     })
 }
@@ -321,8 +354,14 @@ pub unsafe extern "C" fn skep_stepper_upsample(
         let (stepper, estimate, out) = unsafe {
             (get(stepper, "stepper")?, get(estimate, "estimate")?, out(estimate_out, "estimate_out")?)
         };
-        let upsample = || stepper.stepper.upsample(cycle as usize, view as usize, estimate.inner());
-        out.give(skep_estimate::new(stepper.install(upsample)?));
+        let estimate = require_checked(estimate.inner(), "estimate")?;
+        if estimate.view() != view as usize {
+            let (value, expected) =
+                (format!("that of view {}", estimate.view()), format!("that of view {view}"));
+            return Err(Failure::argument("estimate", value, expected));
+        }
+        let upsampled = stepper.install(|| stepper.stepper.upsample(cycle as usize, estimate))?;
+        out.give(skep_estimate::new(AnyEstimate::Checked(upsampled)));
         Ok(())
     })
 }
@@ -346,7 +385,9 @@ pub unsafe extern "C" fn skep_stepper_next(
                 out(next_out, "next_out")?,
             )
         };
-        let next = stepper.stepper.next(cycle as usize, &stepper.estimates(estimates)?)?;
+        // SAFETY: as the header demands of the caller, who keeps the estimates during the call.
+        let estimates = unsafe { skep_stepper::checked(estimates) }?;
+        let next = stepper.stepper.next(cycle as usize, &estimates)?;
         out.set(next.map_or(SKEP_CYCLE_NONE, |next| next as u32));
         Ok(())
     })
@@ -374,7 +415,8 @@ pub unsafe extern "C" fn skep_stepper_finish(
                 out(result_out, "result_out")?,
             )
         };
-        let estimates = stepper.estimates(estimates)?;
+        // SAFETY: as the header demands of the caller, who keeps the estimates during the call.
+        let estimates = unsafe { skep_stepper::checked(estimates) }?;
         let host = Host::new(progress_or_null, user);
         let finish = || stepper.stepper.finish(view as usize, &estimates, &|at| host.tell(at));
         out.give(skep_result::of_view(view, stepper.install(finish)?));

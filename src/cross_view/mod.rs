@@ -1,6 +1,10 @@
-//! What the views tell each other: the consistency check, propagation of planes, and averaging (section 5.6 of the
-//! paper and beyond).
+//! What the estimates of several views say about each other: the consistency check, propagation of planes to other views
+//! (section 5.6 of the paper), and averaging across views.
 
-pub mod averaging;
-pub mod consistency;
-pub mod propagation;
+mod averaging;
+mod consistency;
+mod propagation;
+
+pub use averaging::average;
+pub use consistency::{ConsistencyCheck, ConsistencyRules};
+pub use propagation::{Donor, Target, candidates};

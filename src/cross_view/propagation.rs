@@ -1,56 +1,62 @@
-//! Propagation between views (section 5.6.1 of the paper): consistent solutions are offered to views that have no
-//! validated one there.
+//! Propagation across views (section 5.6.1 of the paper): consistent planes become candidates of pixels of other views that
+//! have no validated plane.
 
 use crate::ambc::Candidate;
-use crate::error::{Error, Result};
-use crate::geometry::Camera;
-use crate::geometry::DepthRange;
-use crate::geometry::MIN_FACING;
-use crate::geometry::RelativePose;
-use crate::pipeline::Cancelled;
-use crate::scene::PlaneMap;
+use crate::error::Result;
+use crate::geometry::{Camera, DepthRange, MIN_FACING, RelativePose};
+use crate::parallel::Advance;
+use crate::scene::PixelEstimate;
 use glam::{DVec2, DVec3, Vec3};
 use rayon::prelude::*;
 
-/// A view that candidates its solutions.
+/// A view whose planes are propagated.
 #[derive(Clone, Copy)]
 pub struct Donor<'a> {
-    /// Its index in the scene: of equal candidates the one of the lowest view is taken.
+    /// Its index in the scene: of candidates of equal cost that of the lowest view is taken.
     pub view: usize,
     /// Its camera on this scale.
     pub camera: &'a Camera,
-    /// Its solutions.
-    pub map: &'a PlaneMap,
+    /// Its checked planes.
+    pub planes: &'a [PixelEstimate],
 }
 
-/// The candidates to the pixels of a target view that are not validated: for each the one of lowest cost among all
-/// solutions that project there and agree with at least one source view. The order of `donors` does not matter.
+/// The view that receives them.
+#[derive(Clone, Copy)]
+pub struct Target<'a> {
+    /// Its camera on this scale.
+    pub camera: &'a Camera,
+    /// Its checked planes: validated pixels receive nothing.
+    pub planes: &'a [PixelEstimate],
+    /// The depths its planes must keep to.
+    pub range: DepthRange,
+}
+
+/// Pixels that one thread takes at once; `advance` is told before each block.
+const BLOCK: usize = 1 << 13;
+
+/// The candidates of the pixels of a target view, depth 0 where there is none: for each pixel that is not validated, of all
+/// donors' planes that project there and are consistent with at least one of their source views, the one of lowest cost. The
+/// order of the donors does not matter.
 ///
 /// # Errors
-/// [`Error::Cancelled`].
-pub fn candidates(
-    camera: &Camera,
-    map: &PlaneMap,
-    range: DepthRange,
-    donors: &[Donor],
-    cancelled: Cancelled,
-) -> Result<Vec<Candidate>> {
+/// What `advance` returns.
+pub fn candidates(target: &Target, donors: &[Donor], advance: Advance) -> Result<Vec<Candidate>> {
     let blocks: Vec<(&Donor, usize)> = (donors.iter())
-        .flat_map(|donor| (0..donor.map.solutions.len()).step_by(BLOCK).map(move |first| (donor, first)))
+        .flat_map(|donor| (0..donor.planes.len()).step_by(BLOCK).map(move |first| (donor, first)))
         .collect();
-    let lists = blocks.into_par_iter().map(|(donor, first)| match cancelled() {
-        true => Err(Error::Cancelled),
-        false => Ok(given(camera, map, range, donor, first)),
+    let lists = blocks.into_par_iter().map(|(donor, first)| {
+        advance(0)?;
+        Ok(propagated(target, donor, first))
     });
     let lists: Vec<Vec<(usize, Ranked)>> = lists.collect::<Result<_>>()?;
-    let mut best = vec![Candidate::default(); camera.pixels()];
+    let mut best = vec![Candidate::default(); target.camera.pixels()];
     best.par_chunks_mut(BLOCK).enumerate().for_each(|(block, best)| {
         let first = block * BLOCK;
         let mut ranked = vec![Ranked::default(); best.len()];
         for list in &lists {
-            let here = &list[list.partition_point(|(target, _)| *target < first)..];
-            for (target, candidate) in here.iter().take_while(|(target, _)| *target < first + best.len()) {
-                ranked[target - first].keep_better(candidate);
+            let here = &list[list.partition_point(|(pixel, _)| *pixel < first)..];
+            for (pixel, candidate) in here.iter().take_while(|(pixel, _)| *pixel < first + best.len()) {
+                ranked[pixel - first].keep_better(candidate);
             }
         }
         best.iter_mut().zip(ranked).for_each(|(best, ranked)| *best = ranked.candidate);
@@ -58,7 +64,7 @@ pub fn candidates(
     Ok(best)
 }
 
-/// An candidate and who makes it.
+/// A candidate and the view it comes from.
 #[derive(Debug, Clone, Copy, Default)]
 struct Ranked {
     candidate: Candidate,
@@ -78,85 +84,86 @@ impl Ranked {
     }
 }
 
-/// Pixels that one thread takes at once, between two looks whether to go on.
-const BLOCK: usize = 1 << 13;
-
-/// The candidates that a view makes from a block of its pixels on, by the pixels they fall on.
-fn given(
-    camera: &Camera,
-    map: &PlaneMap,
-    range: DepthRange,
-    donor: &Donor,
-    first: usize,
-) -> Vec<(usize, Ranked)> {
+/// The candidates from a block of a donor's pixels, by the pixels they project to.
+fn propagated(target: &Target, donor: &Donor, first: usize) -> Vec<(usize, Ranked)> {
+    let camera = target.camera;
     let pose = RelativePose::new(donor.camera, camera);
     let rotation = camera.rotation * donor.camera.rotation.transpose();
     let translation = camera.translation - rotation * donor.camera.translation;
-    let width = donor.camera.width as usize;
+    let grid = donor.camera.grid();
     let mut candidates = Vec::new();
-    for (pixel, solution) in donor.map.solutions.iter().enumerate().skip(first).take(BLOCK) {
-        if solution.depth <= 0.0 || solution.consistent == 0 {
+    for (index, plane) in donor.planes.iter().enumerate().skip(first).take(BLOCK) {
+        if plane.depth <= 0.0 || plane.consistent_views == 0 {
             continue;
         }
-        let (x, y) = (pixel % width, pixel / width);
-        let place = pose.at_infinity(x as f32, y as f32) + pose.epipole / solution.depth;
-        // Most solutions land where another one is validated: what is exact is worked out for the others only.
-        let Some(target) = nearest_pixel(camera, place).filter(|&target| !map.solutions[target].validated)
-        else {
-            continue;
-        };
+        let (x, y) = grid.position(index);
+        let projection = pose.at_infinity(x as f32, y as f32) + pose.epipole / plane.depth;
+        // Most planes project to validated pixels: the exact plane is computed for the others only.
+        let pixel = nearest_pixel(camera, projection).filter(|&pixel| !target.planes[pixel].validated);
+        let Some(pixel) = pixel else { continue };
         let ray = donor.camera.ray(DVec2::new(x as f64, y as f64));
-        let point = rotation * (ray * f64::from(solution.depth)) + translation;
-        let normal = rotation * solution.normal.as_dvec3();
-        if let Some(depth) = depth_at(camera, target, point, normal, range) {
-            let candidate = Candidate { depth, normal: normal.as_vec3(), cost: solution.cost.into() };
-            candidates.push((target, Ranked { candidate, view: donor.view }));
+        let point = rotation * (ray * f64::from(plane.depth)) + translation;
+        let normal = rotation * plane.normal.as_dvec3();
+        if let Some(depth) = depth_at(target, pixel, point, normal) {
+            let candidate = Candidate { depth, normal: normal.as_vec3(), cost: plane.cost.into() };
+            candidates.push((pixel, Ranked { candidate, view: donor.view }));
         }
     }
-    candidates.sort_by_key(|(target, _)| *target);
+    candidates.sort_by_key(|(pixel, _)| *pixel);
     candidates
 }
 
-/// The pixel a homogeneous point falls on, `None` behind the camera or outside its image.
+/// The pixel nearest to a homogeneous point, `None` behind the camera or outside its image.
 fn nearest_pixel(camera: &Camera, point: Vec3) -> Option<usize> {
     let (x, y) = (point.x / point.z + 0.5, point.y / point.z + 0.5);
     let is_inside =
         point.z > 0.0 && x >= 0.0 && y >= 0.0 && x < camera.width as f32 && y < camera.height as f32;
-    is_inside.then(|| y as usize * camera.width as usize + x as usize)
+    is_inside.then(|| camera.grid().index((x as usize, y as usize)))
 }
 
-/// The depth of a plane, through a point of the target's frame, exactly at a pixel.
-fn depth_at(camera: &Camera, pixel: usize, point: DVec3, normal: DVec3, range: DepthRange) -> Option<f32> {
-    let width = camera.width as usize;
-    let ray = camera.ray(DVec2::new((pixel % width) as f64, (pixel / width) as f64));
-    let facing = normal.dot(ray);
+/// The depth, exactly at a pixel, of a plane through a point of the target's frame; `None` where it is not usable. In f64:
+/// the point may be far from the pixel's ray.
+fn depth_at(target: &Target, pixel: usize, point: DVec3, normal: DVec3) -> Option<f32> {
+    let (x, y) = target.camera.grid().position(pixel);
+    let facing = normal.dot(target.camera.ray(DVec2::new(x as f64, y as f64)));
     let depth = normal.dot(point) / facing;
-    let is_usable = facing < -f64::from(MIN_FACING) && depth >= range.near && depth <= range.far;
+    let is_usable =
+        facing < -f64::from(MIN_FACING) && depth >= target.range.near && depth <= target.range.far;
     is_usable.then_some(depth as f32)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::PixelEstimate;
-    use crate::scene::plane_map::ShortCost;
+    use crate::scene::PlaneMap;
     use crate::testing::{self, RANGE, World};
 
-    /// A world, its target's map, and the exact maps of the others.
-    fn target_and_givers() -> (World, PlaneMap, Vec<PlaneMap>) {
+    /// A world, its target's planes, and the exact planes of the other views.
+    fn target_and_donors() -> (World, PlaneMap, Vec<PlaneMap>) {
         let world = World::five();
         let mut maps = world.exact();
         let target = maps.remove(0);
         (world, target, maps)
     }
 
-    /// What views of these indices candidate to view 0.
-    fn offered(world: &World, target: &PlaneMap, donors: &[(usize, &PlaneMap)]) -> Vec<Candidate> {
-        let donors: Vec<Donor> =
-            donors.iter().map(|&(view, map)| Donor { view, camera: &world.cameras[view], map }).collect();
-        let candidates = candidates(&world.cameras[0], target, RANGE, &donors, &|| false).unwrap();
-        assert_eq!(candidates.len(), target.solutions.len());
-        candidates
+    /// The candidates of view 0 from views of these indices.
+    fn propagated(world: &World, target: &PlaneMap, donors: &[(usize, &PlaneMap)]) -> Vec<Candidate> {
+        within(RANGE, world, target, donors)
+    }
+
+    fn within(
+        range: DepthRange,
+        world: &World,
+        target: &PlaneMap,
+        donors: &[(usize, &PlaneMap)],
+    ) -> Vec<Candidate> {
+        let donors: Vec<Donor> = (donors.iter())
+            .map(|&(view, map)| Donor { view, camera: &world.cameras[view], planes: &map.planes })
+            .collect();
+        let target = Target { camera: &world.cameras[0], planes: &target.planes, range };
+        let found = candidates(&target, &donors, &|_| Ok(())).unwrap();
+        assert_eq!(found.len(), target.planes.len());
+        found
     }
 
     fn count(candidates: &[Candidate]) -> usize {
@@ -164,95 +171,97 @@ mod tests {
     }
 
     #[test]
-    fn an_offer_lands_where_its_point_projects_with_its_plane_s_depth_there() {
-        let (world, target, donors) = target_and_givers();
-        let candidates = offered(&world, &target, &[(1, &donors[0])]);
+    fn a_candidate_has_its_plane_s_depth_at_the_pixel_its_point_projects_to() {
+        let (world, target, donors) = target_and_donors();
+        let found = propagated(&world, &target, &[(1, &donors[0])]);
         let camera = &world.cameras[0];
-        assert!(count(&candidates) > camera.pixels() / 2);
-        for (pixel, candidate) in candidates.iter().enumerate().filter(|(_, candidate)| candidate.depth > 0.0)
-        {
-            // Points land beside the pixel's center, and the wall is slanted: only its plane is exact.
+        assert!(count(&found) > camera.pixels() / 2);
+        for (pixel, candidate) in found.iter().enumerate().filter(|(_, candidate)| candidate.depth > 0.0) {
+            // Points project beside the pixel's center, and the wall is slanted: only its plane is exact.
             assert!((candidate.depth / testing::depth(camera, pixel) - 1.0).abs() < 1e-5);
             assert!(candidate.normal.distance(testing::normal(camera)) < 1e-5);
-            assert_eq!(candidate.cost, f32::from(ShortCost::from(0.1)));
+            assert_eq!(
+                candidate.cost,
+                f32::from(PixelEstimate { cost: 0.1.into(), ..Default::default() }.cost)
+            );
         }
     }
 
     #[test]
-    fn a_single_solution_lands_at_a_single_pixel() {
-        let (world, target, mut donors) = target_and_givers();
+    fn a_single_plane_becomes_a_candidate_of_a_single_pixel() {
+        let (world, target, mut donors) = target_and_donors();
         let source = 10 * 36 + 20;
-        for (pixel, solution) in donors[0].solutions.iter_mut().enumerate() {
-            solution.consistent = u8::from(pixel == source);
+        for (pixel, plane) in donors[0].planes.iter_mut().enumerate() {
+            plane.consistent_views = u8::from(pixel == source);
         }
-        let candidates = offered(&world, &target, &[(1, &donors[0])]);
+        let found = propagated(&world, &target, &[(1, &donors[0])]);
         let camera = &world.cameras[1];
-        let depth = f64::from(donors[0].solutions[source].depth);
+        let depth = f64::from(donors[0].planes[source].depth);
         let point = camera.unproject(testing::place(camera, source), depth);
         let (x, y) = world.cameras[0].nearest_pixel(world.cameras[0].project(point).unwrap().0).unwrap();
-        assert_eq!(count(&candidates), 1);
-        assert!(candidates[(y * 36 + x) as usize].depth > 0.0);
+        assert_eq!(count(&found), 1);
+        assert!(found[(y * 36 + x) as usize].depth > 0.0);
     }
 
     #[test]
-    fn validated_pixels_get_no_offer() {
-        let (world, mut target, donors) = target_and_givers();
-        for solution in &mut target.solutions[..500] {
-            solution.validated = true;
+    fn validated_pixels_get_no_candidate() {
+        let (world, mut target, donors) = target_and_donors();
+        for plane in &mut target.planes[..500] {
+            plane.validated = true;
         }
-        let candidates = offered(&world, &target, &[(1, &donors[0]), (2, &donors[1])]);
-        assert_eq!(count(&candidates[..500]), 0);
-        assert!(count(&candidates[500..]) > 250);
+        let found = propagated(&world, &target, &[(1, &donors[0]), (2, &donors[1])]);
+        assert_eq!(count(&found[..500]), 0);
+        assert!(count(&found[500..]) > 250);
     }
 
     #[test]
-    fn only_what_a_source_confirmed_is_offered() {
-        let (world, target, mut donors) = target_and_givers();
-        donors[0].solutions.iter_mut().for_each(|solution| solution.consistent = 0);
-        assert_eq!(count(&offered(&world, &target, &[(1, &donors[0])])), 0);
-        donors[0].solutions.iter_mut().for_each(|solution| {
-            *solution = PixelEstimate { consistent: 1, depth: 0.0, ..*solution };
+    fn only_planes_that_a_source_view_confirmed_are_propagated() {
+        let (world, target, mut donors) = target_and_donors();
+        donors[0].planes.iter_mut().for_each(|plane| plane.consistent_views = 0);
+        assert_eq!(count(&propagated(&world, &target, &[(1, &donors[0])])), 0);
+        donors[0].planes.iter_mut().for_each(|plane| {
+            *plane = PixelEstimate { consistent_views: 1, depth: 0.0, ..*plane };
         });
-        assert_eq!(count(&offered(&world, &target, &[(1, &donors[0])])), 0);
+        assert_eq!(count(&propagated(&world, &target, &[(1, &donors[0])])), 0);
     }
 
     #[test]
-    fn the_cheapest_offer_is_taken_and_of_equals_that_of_the_lowest_view_in_any_order() {
-        let (mut world, target, mut donors) = target_and_givers();
-        // Views at the same place candidate the same points: their normals tell who was taken.
+    fn the_candidate_of_lowest_cost_is_kept_and_of_equals_that_of_the_lowest_view_in_any_order() {
+        let (mut world, target, mut donors) = target_and_donors();
+        // Views at the same position propagate the same points: their normals tell which one was kept.
         (world.cameras[2], world.cameras[3]) = (world.cameras[1], world.cameras[1]);
-        let tilt = |map: &PlaneMap, x: f32, cost: f32| {
+        let tilted = |map: &PlaneMap, x: f32, cost: f32| {
             let mut map = map.clone();
-            map.solutions.iter_mut().for_each(|s| {
-                *s = PixelEstimate { normal: (s.normal + x * Vec3::X).normalize(), cost: cost.into(), ..*s };
+            map.planes.iter_mut().for_each(|plane| {
+                let normal = (plane.normal + x * Vec3::X).normalize();
+                *plane = PixelEstimate { normal, cost: cost.into(), ..*plane };
             });
             map
         };
-        donors[1] = tilt(&donors[0], 0.1, 0.1);
-        donors[2] = tilt(&donors[0], 0.2, 0.05);
+        donors[1] = tilted(&donors[0], 0.1, 0.1);
+        donors[2] = tilted(&donors[0], 0.2, 0.05);
         let (one, two, three) = ((1, &donors[0]), (2, &donors[1]), (3, &donors[2]));
-        let only = |donor| offered(&world, &target, &[donor]);
+        let only = |donor| propagated(&world, &target, &[donor]);
         assert_ne!(only(one), only(two));
-        assert_eq!(offered(&world, &target, &[one, two]), only(one));
-        assert_eq!(offered(&world, &target, &[two, one]), only(one));
+        assert_eq!(propagated(&world, &target, &[one, two]), only(one));
+        assert_eq!(propagated(&world, &target, &[two, one]), only(one));
         for order in [[one, two, three], [three, one, two], [two, three, one]] {
-            assert_eq!(offered(&world, &target, &order), only(three));
+            assert_eq!(propagated(&world, &target, &order), only(three));
         }
     }
 
     #[test]
-    fn without_givers_nothing_is_offered() {
-        let (world, target, _) = target_and_givers();
-        assert_eq!(offered(&world, &target, &[]), vec![Candidate::default(); target.solutions.len()]);
+    fn without_donors_there_are_no_candidates() {
+        let (world, target, _) = target_and_donors();
+        assert_eq!(propagated(&world, &target, &[]), vec![Candidate::default(); target.planes.len()]);
     }
 
     #[test]
-    fn a_plane_beyond_the_target_s_range_or_turned_away_is_not_offered() {
-        let (world, target, mut donors) = target_and_givers();
+    fn a_plane_out_of_the_target_s_range_or_turned_away_is_not_propagated() {
+        let (world, target, mut donors) = target_and_donors();
         let short = DepthRange { near: 1.0, far: 3.0 };
-        let donor = Donor { view: 1, camera: &world.cameras[1], map: &donors[0] };
-        assert_eq!(count(&candidates(&world.cameras[0], &target, short, &[donor], &|| false).unwrap()), 0);
-        donors[0].solutions.iter_mut().for_each(|solution| solution.normal = -solution.normal);
-        assert_eq!(count(&offered(&world, &target, &[(1, &donors[0])])), 0);
+        assert_eq!(count(&within(short, &world, &target, &[(1, &donors[0])])), 0);
+        donors[0].planes.iter_mut().for_each(|plane| plane.normal = -plane.normal);
+        assert_eq!(count(&propagated(&world, &target, &[(1, &donors[0])])), 0);
     }
 }

@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::image::Picture;
 use crate::options::FusionOptions;
-use crate::pipeline::{Hook, Phase, Progress};
+use crate::pipeline::{Phase, Progress, ProgressFn};
 use crate::scene::{Maps, PixelStatus};
 use average::{Member, average};
 pub use cloud::{PointCloud, PointViews};
@@ -86,7 +86,7 @@ const BAND_ROWS: u32 = 32;
 /// assert_eq!(cloud.views.get(0), [0, 1]);
 /// # Ok::<(), skep::Error>(())
 /// ```
-pub fn fuse(views: &[FusionView], options: &FusionOptions, hook: Hook) -> Result<PointCloud> {
+pub fn fuse(views: &[FusionView], options: &FusionOptions, progress: ProgressFn) -> Result<PointCloud> {
     options.check()?;
     for index in 0..views.len() {
         check_view(views, index)?;
@@ -96,9 +96,8 @@ pub fn fuse(views: &[FusionView], options: &FusionOptions, hook: Hook) -> Result
     let mut rows_done = 0;
     let report = |view: usize, rows_done: u64| {
         let done = rows_done as f64 / total_rows.max(1) as f64;
-        let progress =
-            Progress { phase: Phase::Fusion, downscale: 1, cycle: 0, view, views: views.len(), done };
-        if hook(&progress).is_break() { Err(Error::Cancelled) } else { Ok(()) }
+        let at = Progress { phase: Phase::Fusion, downscale: 1, cycle: 0, view, views: views.len(), done };
+        if progress(&at).is_break() { Err(Error::Cancelled) } else { Ok(()) }
     };
 
     let mut cloud = PointCloud::default();

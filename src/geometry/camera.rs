@@ -3,6 +3,7 @@
 //! Conventions: `x_cam = R * X_world + t` with x right, y down, z forward; pixel centers are integers, the
 //! top-left pixel's center is (0, 0); depth is z in the camera frame.
 
+use super::Grid;
 use crate::error::{Error, Result};
 use glam::{DMat3, DVec2, DVec3};
 
@@ -68,6 +69,11 @@ impl Camera {
     /// Number of pixels of its image.
     pub fn pixels(&self) -> usize {
         self.width as usize * self.height as usize
+    }
+
+    /// The grid of its pixels.
+    pub(crate) fn grid(&self) -> Grid {
+        Grid { width: self.width as usize, height: self.height as usize }
     }
 
     /// The calibration matrix K.

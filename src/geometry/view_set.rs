@@ -23,21 +23,6 @@ impl ViewSets {
         sets
     }
 
-    /// Holds no pixel's set any more.
-    pub(crate) fn clear(&mut self) {
-        self.bits = Vec::new();
-    }
-
-    /// Whether it holds no pixel's set.
-    pub(crate) fn is_clear(&self) -> bool {
-        self.bits.is_empty()
-    }
-
-    /// The sets of these pixels, in their order.
-    pub(crate) fn of(&self, pixels: impl Iterator<Item = usize>) -> ViewSets {
-        ViewSets { words: self.words, bits: pixels.flat_map(|pixel| self.words_of(pixel)).copied().collect() }
-    }
-
     /// Whether the pixel's set holds the source at this place of the list.
     pub fn contains(&self, pixel: usize, source: usize) -> bool {
         self.bits[pixel * self.words + source / 32] >> (source % 32) & 1 != 0

@@ -1,13 +1,15 @@
 //! Box blur and noise at single pixels.
 
 use super::PackedImage;
+use crate::geometry::Grid;
 
-/// Mean gray value of the pixels up to `radius` columns and rows away.
+/// Mean gray value of the pixels within `radius` columns and rows of a pixel and inside the image.
 pub fn blurred(image: &PackedImage, pixel: usize, radius: usize) -> f32 {
-    let (x, y) = (pixel % image.width, pixel / image.width);
+    let grid = Grid { width: image.width, height: image.height };
+    let (x, y) = grid.position(pixel);
     let (mut sum, mut count) = (0u32, 0u32);
-    for row in y.saturating_sub(radius)..=(y + radius).min(image.height - 1) {
-        for column in x.saturating_sub(radius)..=(x + radius).min(image.width - 1) {
+    for row in y.saturating_sub(radius)..=(y + radius).min(grid.height - 1) {
+        for column in x.saturating_sub(radius)..=(x + radius).min(grid.width - 1) {
             sum += u32::from(image.gray(column, row));
             count += 1;
         }
@@ -15,7 +17,8 @@ pub fn blurred(image: &PackedImage, pixel: usize, radius: usize) -> f32 {
     sum as f32 / count as f32
 }
 
-/// Deviation of the noise at a pixel.
+/// Standard deviation of the noise at a pixel, in gray values; 0 where it is not known.
 pub fn deviation(image: &PackedImage, pixel: usize) -> f32 {
-    image.noise.variance(image.gray(pixel % image.width, pixel / image.width)).sqrt()
+    let (x, y) = Grid { width: image.width, height: image.height }.position(pixel);
+    image.noise.variance(image.gray(x, y)).sqrt()
 }

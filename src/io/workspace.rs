@@ -104,14 +104,14 @@ impl Workspace {
     /// A name that would lead out of the folder; a file that cannot be written.
     pub fn write_view(&self, name: &str, camera: &Camera, result: &ViewResult) -> Result<()> {
         Workspace::check_name(name)?;
-        let filtered = result.filtered();
-        self.write_maps(name, MapKind::Raw, camera, &result.estimate, result)?;
-        self.write_maps(name, MapKind::Validated, camera, &filtered, result)?;
+        let validated = result.validated();
+        self.write_maps(name, MapKind::Raw, camera, &result.raw, result)?;
+        self.write_maps(name, MapKind::Validated, camera, &validated, result)?;
         let (width, height) = (camera.width, camera.height);
-        write_depth_preview(&self.preview(name, "depth"), width, height, &filtered.depth)?;
-        write_normal_preview(&self.preview(name, "normal"), width, height, &filtered.normal)?;
+        write_depth_preview(&self.preview(name, "depth"), width, height, &validated.depth)?;
+        write_normal_preview(&self.preview(name, "normal"), width, height, &validated.normal)?;
         write_views_preview(&self.preview(name, "views"), width, height, result.sources.len(), |pixel| {
-            if filtered.depth[pixel] > 0.0 { result.view_sets.count(pixel) } else { 0 }
+            if validated.depth[pixel] > 0.0 { result.view_sets.count(pixel) } else { 0 }
         })
     }
 

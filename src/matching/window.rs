@@ -123,7 +123,7 @@ impl Window {
 
     /// The bilateral weight of a difference of gray values.
     #[inline(always)]
-    pub fn likeness(&self, a: u8, b: u8) -> f32 {
+    pub fn similarity(&self, a: u8, b: u8) -> f32 {
         self.color_weights[usize::from(a.abs_diff(b))]
     }
 

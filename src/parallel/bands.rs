@@ -34,25 +34,25 @@ impl Bands {
     }
 }
 
-/// Does `work` for each band on the threads of the current rayon pool, compiled for the instruction set, and merges the
-/// results in any order. Before each band, `advance` is told of a band of `units` units of work, and may cancel.
+/// Does `work` for each band on the threads of the current rayon pool, compiled for the instruction set, and returns the
+/// results in order. Before each band `advance` counts `units` units of work.
 ///
 /// # Errors
-/// What `advance` returns.
+/// What `advance` returns; bands that have not begun are left out then.
 #[inline(always)]
-pub fn run_bands<S: Simd, B: Send, R: Send + Default>(
+pub fn run_bands<S: Simd, B: Send, R: Send>(
     simd: S,
-    bands: impl IndexedParallelIterator<Item = B>,
-    (advance, units): (Advance, u64),
+    bands: Vec<B>,
+    advance: Advance,
+    units: u64,
     work: impl Fn(B) -> R + Sync,
-    merge: impl Fn(R, R) -> R + Sync,
-) -> Result<R> {
-    let band = |band: B| {
+) -> Result<Vec<R>> {
+    let run = |band: B| {
         advance(units)?;
         Ok(simd.vectorize(
             #[inline(always)]
             || work(band),
         ))
     };
-    bands.with_max_len(1).map(band).try_reduce(R::default, |a, b| Ok(merge(a, b)))
+    bands.into_par_iter().with_max_len(1).map(run).collect()
 }

@@ -1,138 +1,101 @@
-//! What is known of one view between two stepper.
+//! The estimate of one view between two stages. Its type says which stage it has passed.
 
+use super::context::{Place, RunContext};
+use super::result::CycleRecord;
 use super::stepper::Stepper;
 use crate::ambc::Counts;
 use crate::error::{Error, Result};
 use crate::geometry::ViewSets;
-use crate::pipeline::CycleRecord;
-use crate::scene::Maps;
-use crate::scene::{PixelEstimate, PlaneMap};
-use glam::Vec3;
+use crate::scene::{CompactPlane, Maps, PixelEstimate, PlaneMap};
+use glam::{DVec2, Vec3};
 
-/// What is known of one view after it was searched in a cycle or, once it is marked, after the check of that cycle.
+/// The planes of one view on one scale, after the stage `S`: [`Searched`] or [`Checked`].
 #[derive(Debug, Clone)]
-pub struct ViewEstimate {
-    pub(super) view: usize,
-    pub(super) cycle: usize,
-    pub(super) marked: bool,
-    pub(super) solved: PlaneMap,
+pub struct ViewEstimate<S> {
+    pub(super) at: Place,
+    pub(super) map: PlaneMap,
     pub(super) counts: Counts,
     pub(super) cycles: Vec<CycleRecord>,
+    pub(super) stage: S,
 }
 
-/// A host's own maps of a view, to start from or to check others against.
+/// Searched, textureless regions not filled yet.
+#[derive(Debug, Clone)]
+pub struct Unfilled {
+    pub(super) view_sets: ViewSets,
+    pub(super) is_textureless: Vec<bool>,
+}
+
+/// Searched in a cycle and not checked: no plane is validated.
+#[derive(Debug, Clone)]
+pub struct Searched {
+    /// The source views that each plane is checked against.
+    pub(super) view_sets: ViewSets,
+}
+
+/// Checked, not filtered and published yet.
+#[derive(Debug, Clone)]
+pub struct Unpublished;
+
+/// Checked in a cycle, filtered and published: carries the verdicts, and the validated surface as other views read it.
+#[derive(Debug, Clone)]
+pub struct Checked {
+    pub(super) surface: Vec<CompactPlane>,
+}
+
+/// An estimate after either stage.
+#[derive(Debug, Clone)]
+pub enum AnyEstimate {
+    /// After a search.
+    Searched(ViewEstimate<Searched>),
+    /// After a check.
+    Checked(ViewEstimate<Checked>),
+}
+
+/// A reference to an estimate after either stage.
+#[derive(Debug, Clone, Copy)]
+pub enum EstimateRef<'a> {
+    /// After a search.
+    Searched(&'a ViewEstimate<Searched>),
+    /// After a check.
+    Checked(&'a ViewEstimate<Checked>),
+}
+
+/// The maps of a view that the host brings, to start from or to check others against.
 #[derive(Debug, Clone, Copy)]
 pub struct OwnMaps<'a> {
     /// Depth and normal of every pixel on the cycle's scale.
     pub maps: &'a Maps,
-    /// Which solutions count as validated; `None` validates all that have a depth.
+    /// Which planes count as validated; `None` validates all that have a depth.
     pub validated: Option<&'a [bool]>,
-    /// Cost of each solution, which ranks what is offered to other views and is kept to a 256th; `None` is 0.
+    /// Cost of each plane, which ranks what is propagated to other views and is kept to a 256th; `None` is 0.
     pub cost: Option<&'a [f32]>,
 }
 
-impl ViewEstimate {
-    /// The estimate of a view whose maps the host brings, as if it had been checked in this cycle.
-    ///
-    /// # Errors
-    /// A cycle or view there is not; maps of another size than the view has in the cycle; a depth that is negative or not
-    /// finite; a normal that is not unit or turned away from the camera where there is a depth; a cost that is negative
-    /// or not a number.
-    pub fn from_maps(stepper: &Stepper, cycle: usize, view: usize, own: &OwnMaps) -> Result<ViewEstimate> {
-        let (width, height) = stepper.size(cycle, view)?;
-        let pixels = width as usize * height as usize;
-        let lengths = [
-            ("maps.depth", Some(own.maps.depth.len())),
-            ("maps.normal", Some(own.maps.normal.len())),
-            ("validated", own.validated.map(<[bool]>::len)),
-            ("cost", own.cost.map(<[f32]>::len)),
-        ];
-        for (name, length) in lengths {
-            if length.is_some_and(|length| length != pixels) {
-                let value = format!("{} values", length.unwrap_or(0));
-                return Err(Error::argument(
-                    name,
-                    value,
-                    format!("one for each of {width} x {height} pixels"),
-                ));
-            }
-        }
-        let camera = &stepper.scaled(cycle, view).camera;
-        let mut solutions = vec![PixelEstimate::default(); pixels];
-        for (pixel, solution) in solutions.iter_mut().enumerate() {
-            let (depth, normal) = (own.maps.depth[pixel], Vec3::from_array(own.maps.normal[pixel]));
-            let place = (pixel % width as usize, pixel / width as usize);
-            let name = |map: &str| format!("{map} at column {}, row {}", place.0, place.1);
-            if !(depth.is_finite() && depth >= 0.0) {
-                return Err(Error::argument(name("depth"), depth, "a finite depth above 0, or 0 for none"));
-            }
-            if let Some(cost) = own.cost.map(|cost| cost[pixel])
-                && (cost.is_nan() || cost < 0.0)
-            {
-                return Err(Error::argument(name("cost"), cost, "a number of at least 0"));
-            }
-            solution.cost = own.cost.map_or(0.0, |cost| cost[pixel]).into();
-            if depth == 0.0 {
-                continue;
-            }
-            let ray = camera.ray(glam::DVec2::new(place.0 as f64, place.1 as f64)).as_vec3();
-            if !is_unit(normal) || normal.dot(ray) >= 0.0 {
-                let expected = "a unit vector that faces the camera (n . ray < 0)";
-                return Err(Error::argument(name("normal"), normal, expected));
-            }
-            let validated = own.validated.is_none_or(|validated| validated[pixel]);
-            let consistent =
-                if validated { stepper.options.check.min_consistent_views.min(255) as u8 } else { 0 };
-            *solution =
-                PixelEstimate { depth, normal: normal.normalize(), consistent, validated, ..*solution };
-        }
-        let verdicts: Vec<(u8, bool)> =
-            solutions.iter().map(|solution| (solution.consistent, solution.validated)).collect();
-        let sets = ViewSets::full(pixels, stepper.sources(view).len());
-        let mut solved = PlaneMap { solutions, sets, ..PlaneMap::default() };
-        solved.mark(camera, &verdicts);
-        Ok(ViewEstimate { view, cycle, marked: true, solved, counts: Counts::default(), cycles: Vec::new() })
-    }
-
-    /// The view it is of.
+impl<S> ViewEstimate<S> {
+    /// The view.
     pub fn view(&self) -> usize {
-        self.view
+        self.at.view
     }
 
-    /// The cycle it was searched in, or whose scale it was handed up to.
+    /// The cycle it was searched in, or to whose scale it was upsampled.
     pub fn cycle(&self) -> usize {
-        self.cycle
-    }
-
-    /// Whether it carries the verdicts of a check.
-    pub fn is_marked(&self) -> bool {
-        self.marked
+        self.at.cycle
     }
 
     /// Number of pixels on its scale.
     pub fn pixels(&self) -> usize {
-        self.solved.solutions.len()
+        self.map.planes.len()
     }
 
     /// Depth and normal of every pixel, validated or not.
     pub fn maps(&self) -> Maps {
-        maps_of(&self.solved.solutions)
+        maps_of(&self.map.planes)
     }
 
-    /// Aggregated cost of every pixel's solution, to a 256th.
+    /// Aggregated cost of every pixel's plane, to a 256th.
     pub fn cost(&self) -> impl ExactSizeIterator<Item = f32> + '_ {
-        self.solved.solutions.iter().map(|solution| solution.cost.into())
-    }
-
-    /// For every pixel the number of source views consistent with its solution, at most 255, and whether that validates
-    /// it; nothing before it is marked.
-    pub fn verdicts(&self) -> impl ExactSizeIterator<Item = (u8, bool)> + '_ {
-        self.solved.solutions.iter().map(|solution| (solution.consistent, solution.validated))
-    }
-
-    /// The view set each pixel was matched with.
-    pub fn view_sets(&self) -> &ViewSets {
-        &self.solved.sets
+        self.map.planes.iter().map(|plane| plane.cost.into())
     }
 
     /// Work done for the view so far.
@@ -145,30 +108,207 @@ impl ViewEstimate {
         &self.cycles
     }
 
-    /// Drops the view sets, which nothing but the check asks for.
-    pub(super) fn forget_view_sets(&mut self) {
-        self.solved.sets.clear();
+    pub(super) fn planes(&self) -> &[PixelEstimate] {
+        &self.map.planes
     }
 
-    pub(super) fn fits(&self, width: u32, height: u32, sources: usize) -> bool {
-        let pixels = width as usize * height as usize;
-        let words = ViewSets::empty(0, sources).words_per_pixel();
-        self.pixels() == pixels && self.solved.sets.words_per_pixel() == words
+    /// The same planes after another stage.
+    pub(super) fn into_stage<T>(self, stage: T) -> (ViewEstimate<T>, S) {
+        let ViewEstimate { at, map, counts, cycles, stage: before } = self;
+        (ViewEstimate { at, map, counts, cycles, stage }, before)
+    }
+}
+
+impl ViewEstimate<Searched> {
+    /// The source views that each pixel is checked against, along the view's source list.
+    pub fn view_sets(&self) -> &ViewSets {
+        &self.stage.view_sets
+    }
+}
+
+impl ViewEstimate<Checked> {
+    /// The estimate of a view whose maps the host brings, as if it had been checked in this cycle.
+    ///
+    /// # Errors
+    /// A cycle or view that does not exist; maps of another size than the view has in the cycle; a depth that is negative
+    /// or not finite; a normal that is not unit or turned away from the camera where there is a depth; a cost that is
+    /// negative or not a number.
+    pub fn from_maps(stepper: &Stepper, cycle: usize, view: usize, own: &OwnMaps) -> Result<Self> {
+        let (context, at) = (stepper.context(), Place { cycle, view });
+        context.check_place(at)?;
+        let map = plane_map(context, at, own)?;
+        let surface = map.publish(&context.scaled(at).camera);
+        let (counts, cycles) = (Counts::default(), Vec::new());
+        Ok(ViewEstimate { at, map, counts, cycles, stage: Checked { surface } })
     }
 
-    /// Refuses a estimate that is (not) marked; `name` is how the error calls it.
-    pub(super) fn require_marked(&self, name: &str, marked: bool) -> Result<()> {
-        if self.marked == marked {
-            return Ok(());
+    /// For every pixel the number of source views consistent with its plane, at most 255, and whether that validates it.
+    pub fn verdicts(&self) -> impl ExactSizeIterator<Item = (u8, bool)> + '_ {
+        self.map.planes.iter().map(|plane| (plane.consistent_views, plane.validated))
+    }
+
+    pub(super) fn surface(&self) -> &[CompactPlane] {
+        &self.stage.surface
+    }
+
+    pub(super) fn take_surface(&mut self) -> Vec<CompactPlane> {
+        std::mem::take(&mut self.stage.surface)
+    }
+}
+
+/// Calls a method of the estimate, whatever its stage.
+macro_rules! either {
+    ($estimate:expr, $name:ident => $call:expr) => {
+        match $estimate {
+            AnyEstimate::Searched($name) => $call,
+            AnyEstimate::Checked($name) => $call,
         }
-        let estimate = |marked| if marked { "checked in its cycle" } else { "searched and not yet checked" };
-        Err(Error::argument(name, estimate(self.marked), estimate(marked)))
+    };
+}
+
+impl AnyEstimate {
+    /// The view.
+    pub fn view(&self) -> usize {
+        either!(self, estimate => estimate.view())
     }
 
-    pub(super) fn on_finer_scale(&self, cycle: usize, solved: PlaneMap) -> ViewEstimate {
-        let (counts, cycles) = (self.counts, self.cycles.clone());
-        ViewEstimate { view: self.view, cycle, marked: true, solved, counts, cycles }
+    /// The cycle it was searched in, or to whose scale it was upsampled.
+    pub fn cycle(&self) -> usize {
+        either!(self, estimate => estimate.cycle())
     }
+
+    /// Number of pixels on its scale.
+    pub fn pixels(&self) -> usize {
+        either!(self, estimate => estimate.pixels())
+    }
+
+    /// Depth and normal of every pixel, validated or not.
+    pub fn maps(&self) -> Maps {
+        either!(self, estimate => estimate.maps())
+    }
+
+    /// Aggregated cost of every pixel's plane, to a 256th.
+    pub fn cost(&self) -> Vec<f32> {
+        either!(self, estimate => estimate.cost().collect())
+    }
+
+    /// Whether each pixel's plane is validated; none is before a check.
+    pub fn validated(&self) -> Vec<bool> {
+        self.planes().iter().map(|plane| plane.validated).collect()
+    }
+
+    /// Work done for the view so far.
+    pub fn counts(&self) -> Counts {
+        either!(self, estimate => estimate.counts())
+    }
+
+    /// The cycles of the view so far.
+    pub fn cycles(&self) -> &[CycleRecord] {
+        either!(self, estimate => estimate.cycles())
+    }
+
+    /// The estimate as bytes, which [`AnyEstimate::from_bytes`] of the same version of the crate reads.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        either!(self, estimate => estimate.to_bytes())
+    }
+
+    /// Length of [`AnyEstimate::to_bytes`].
+    pub fn byte_len(&self) -> usize {
+        either!(self, estimate => estimate.byte_len())
+    }
+
+    /// The estimate, `None` when it is not checked.
+    pub fn checked(&self) -> Option<&ViewEstimate<Checked>> {
+        match self {
+            AnyEstimate::Checked(estimate) => Some(estimate),
+            AnyEstimate::Searched(_) => None,
+        }
+    }
+
+    /// The estimate, `None` when it is checked.
+    pub fn searched(&self) -> Option<&ViewEstimate<Searched>> {
+        match self {
+            AnyEstimate::Searched(estimate) => Some(estimate),
+            AnyEstimate::Checked(_) => None,
+        }
+    }
+
+    fn planes(&self) -> &[PixelEstimate] {
+        either!(self, estimate => estimate.planes())
+    }
+}
+
+impl<'a> EstimateRef<'a> {
+    pub(super) fn planes(self) -> &'a [PixelEstimate] {
+        match self {
+            EstimateRef::Searched(estimate) => estimate.planes(),
+            EstimateRef::Checked(estimate) => estimate.planes(),
+        }
+    }
+}
+
+impl<'a> From<&'a ViewEstimate<Searched>> for EstimateRef<'a> {
+    fn from(estimate: &'a ViewEstimate<Searched>) -> Self {
+        EstimateRef::Searched(estimate)
+    }
+}
+
+impl<'a> From<&'a ViewEstimate<Checked>> for EstimateRef<'a> {
+    fn from(estimate: &'a ViewEstimate<Checked>) -> Self {
+        EstimateRef::Checked(estimate)
+    }
+}
+
+impl<'a> From<&'a AnyEstimate> for EstimateRef<'a> {
+    fn from(estimate: &'a AnyEstimate) -> Self {
+        either!(estimate, estimate => estimate.into())
+    }
+}
+
+/// The host's maps as planes.
+fn plane_map(context: &RunContext, at: Place, own: &OwnMaps) -> Result<PlaneMap> {
+    let camera = &context.scaled(at).camera;
+    let grid = camera.grid();
+    let lengths = [
+        ("maps.depth", Some(own.maps.depth.len())),
+        ("maps.normal", Some(own.maps.normal.len())),
+        ("validated", own.validated.map(<[bool]>::len)),
+        ("cost", own.cost.map(<[f32]>::len)),
+    ];
+    for (name, length) in lengths {
+        if let Some(length) = length.filter(|&length| length != grid.pixels()) {
+            let expected = format!("one for each of {} x {} pixels", grid.width, grid.height);
+            return Err(Error::argument(name, format!("{length} values"), expected));
+        }
+    }
+    let consistent_views = context.options.check.min_consistent_views.min(255) as u8;
+    let mut planes = vec![PixelEstimate::default(); grid.pixels()];
+    for (index, plane) in planes.iter_mut().enumerate() {
+        let (depth, normal) = (own.maps.depth[index], Vec3::from_array(own.maps.normal[index]));
+        let (x, y) = grid.position(index);
+        let name = |map: &str| format!("{map} at column {x}, row {y}");
+        if !(depth.is_finite() && depth >= 0.0) {
+            return Err(Error::argument(name("depth"), depth, "a finite depth above 0, or 0 for none"));
+        }
+        if let Some(cost) = own.cost.map(|cost| cost[index])
+            && (cost.is_nan() || cost < 0.0)
+        {
+            return Err(Error::argument(name("cost"), cost, "a number of at least 0"));
+        }
+        plane.cost = own.cost.map_or(0.0, |cost| cost[index]).into();
+        if depth == 0.0 {
+            continue;
+        }
+        let ray = camera.ray(DVec2::new(x as f64, y as f64)).as_vec3();
+        if !is_unit(normal) || normal.dot(ray) >= 0.0 {
+            let expected = "a unit vector that faces the camera (n . ray < 0)";
+            return Err(Error::argument(name("normal"), normal, expected));
+        }
+        let validated = own.validated.is_none_or(|validated| validated[index]);
+        let consistent_views = if validated { consistent_views } else { 0 };
+        *plane = PixelEstimate { depth, normal: normal.normalize(), consistent_views, validated, ..*plane };
+    }
+    Ok(PlaneMap { planes })
 }
 
 /// Whether a normal is a unit vector as far as files and f32 keep it one.
@@ -176,10 +316,10 @@ pub(super) fn is_unit(normal: Vec3) -> bool {
     (normal.length() - 1.0).abs() < 1e-2
 }
 
-/// Depth and normal of every solution; on one thread, as hosts ask for them outside any pool.
-pub(super) fn maps_of(solutions: &[PixelEstimate]) -> Maps {
+/// Depth and normal of every plane; on one thread, as hosts ask for them outside any pool.
+pub(super) fn maps_of(planes: &[PixelEstimate]) -> Maps {
     Maps {
-        depth: solutions.iter().map(|solution| solution.depth).collect(),
-        normal: solutions.iter().map(|solution| solution.normal.to_array()).collect(),
+        depth: planes.iter().map(|plane| plane.depth).collect(),
+        normal: planes.iter().map(|plane| plane.normal.to_array()).collect(),
     }
 }

@@ -1,178 +1,139 @@
-//! The cycles (section 3 of the paper): search every view, check the views against each other, let what was validated
-//! guide the next search; from the coarsest scale to full size; then fuse.
+//! A run, stage by stage (section 3 of the paper and beyond).
+//!
+//! What a stage changes is in its name and signature, and what it reads of other views is in the types of its inputs: checked
+//! planes, searched planes, or published surfaces. A stage of one view needs nothing else of other views: it can run in this
+//! process or in another, from memory or from files.
 
+mod context;
 mod cycle;
 mod estimate;
-mod finish;
 mod progress;
 mod result;
 mod serialize;
 mod stages;
 mod status;
 mod stepper;
+mod store;
 
 use crate::error::Result;
-use crate::fusion::PointCloud;
-use crate::fusion::{self, FusionView};
 use crate::options::Options;
 use crate::parallel::JoinedPool;
-use crate::scene::CompactPlane;
 use crate::scene::Scene;
+use context::{Place, RunContext};
 pub use cycle::Cycle;
-pub use estimate::{OwnMaps, ViewEstimate};
-pub(crate) use progress::{Cancelled, Tracker};
-pub use progress::{Hook, Phase, Progress, ignore_progress};
-use rayon::prelude::*;
+pub use estimate::{AnyEstimate, Checked, EstimateRef, OwnMaps, Searched, ViewEstimate};
+use progress::Tracker;
+pub use progress::{Phase, Progress, ProgressFn, ignore_progress};
 pub use result::{CycleRecord, Reconstruction, ViewResult};
-use stages::Shown;
-pub use stages::{Candidates, Verdicts};
-use std::ops::ControlFlow;
+pub use stages::Candidates;
+use stages::SearchInput;
 pub use stepper::Stepper;
+use store::Store;
 
-/// Estimates depth, normal and view set of every pixel of every view, and fuses the validated ones.
+/// Estimates depth, normal and view set of every pixel of every view, and fuses the validated ones into points.
 ///
 /// Runs on a thread pool of its own, joined before it returns; may be called from several threads at once. The same
 /// scene, options and crate version give the same bits for any number of threads and any instruction set.
 ///
 /// # Errors
-/// An option out of its range, named; [`crate::Error::Cancelled`] when the hook breaks.
-pub fn reconstruct(scene: &Scene, options: &Options, hook: Hook) -> Result<Reconstruction> {
+/// An option out of its range, named; [`crate::Error::Cancelled`] when `progress` breaks.
+pub fn reconstruct(scene: &Scene, options: &Options, progress: ProgressFn) -> Result<Reconstruction> {
     options.check()?;
-    JoinedPool::new(options.threads)?.install(|| run(scene, options, hook))
+    JoinedPool::new(options.threads)?.install(|| run(scene, options, progress))
 }
 
-/// Threads that find work enough in one view most of the time.
-const THREADS_PER_VIEW: usize = 4;
-/// Share of the whole work that fusion is reckoned at.
-const FUSION_SHARE: f64 = 0.03;
-
-fn run(scene: &Scene, options: &Options, hook: Hook) -> Result<Reconstruction> {
-    let start = Progress {
-        phase: Phase::Search,
-        downscale: 1,
-        cycle: 0,
-        view: 0,
-        views: scene.views().len(),
-        done: 0.0,
-    };
-    let stepper = Stepper::new_with(scene, options, &|| hook(&start).is_break())?;
-    let work_before = |cycle| stepper.all()[..cycle].iter().map(|cycle| cycle.work(scene)).sum::<u64>();
-    let total = work_before(stepper.all().len());
-    let tracker = Tracker::new(hook, (total as f64 / (1.0 - FUSION_SHARE)) as u64);
-    let mut estimates: Vec<ViewEstimate> = Vec::new();
+/// The cycles of all scales, coarse to fine, then the end of the run.
+fn run(scene: &Scene, options: &Options, progress: ProgressFn) -> Result<Reconstruction> {
+    let mut tracker = Tracker::new(progress);
+    let context = RunContext::new(scene, options, &|_| tracker.advance(0, Progress::start(scene)))?;
+    tracker.set_work(context.work_before(context.cycles().len()));
+    let mut estimates = Store::unknown(context.views());
     let mut next = Some(0);
     while let Some(cycle) = next {
-        estimates = run_cycle(&stepper, cycle, estimates, &tracker)?;
-        next = stepper.next(cycle, &some(&estimates))?;
-        tracker.jump_to(work_before(next.unwrap_or(stepper.all().len())));
+        estimates = run_cycle(&context, cycle, estimates, &tracker)?;
+        next = context.next_cycle(cycle, estimates.known());
+        tracker.jump_to(context.work_before(next.unwrap_or(context.cycles().len())));
     }
-    let views = finish(&stepper, estimates, &tracker)?;
-    let warnings = stepper.warnings().to_vec();
-    drop(stepper);
-    let points = fuse(scene, options, &views, hook)?;
+    let views = finish(&context, estimates, &tracker)?;
+    let warnings = context.warnings().to_vec();
+    drop(context);
+    let points = stages::fuse(scene, options, &views, &tracker)?;
     Ok(Reconstruction { views, points, warnings })
 }
 
-/// One cycle: every view is searched from the estimates the last cycle left, then all are checked.
+/// One cycle: every view is searched from the estimates of the cycle before, then all are checked against each other.
 fn run_cycle(
-    stepper: &Stepper,
+    context: &RunContext,
     cycle: usize,
-    estimates: Vec<ViewEstimate>,
+    previous: Store<Option<ViewEstimate<Checked>>>,
     tracker: &Tracker,
-) -> Result<Vec<ViewEstimate>> {
-    let views = stepper.views();
-    let estimates = each_view(estimates, |view, estimate| match stepper.is_coarser(&estimate, cycle) {
-        true => stepper.upsample(cycle, view, &estimate),
-        false => Ok(estimate),
+) -> Result<Store<Option<ViewEstimate<Checked>>>> {
+    let at = |view| Place { cycle, view };
+    let searching = |view, units| tracker.advance(units, context.progress(Phase::Search, at(view)));
+    let checking = |view, units| tracker.advance(units, context.progress(Phase::Check, at(view)));
+
+    let previous = previous.map(|view, own| stages::upsample(context, at(view), own))?;
+
+    // Reads the checked planes of the views that have this one among their sources.
+    let candidates = previous.map_ref(|view, own| {
+        let donors = context.donors(at(view), |donor| previous.planes(donor));
+        stages::propagate(context, at(view), own.as_ref(), &donors, &|units| searching(view, units))
     })?;
-    let searching = |view| stepper.all()[cycle].progress(Phase::Search, view, views);
-    let before = some(&estimates);
-    let candidates = each_view(vec![(); views], |view, ()| {
-        stepper.propagate_with(cycle, view, &before, &|| tracker.advance(0, searching(view)))
-    })?;
-    // From here on a view's own estimate is of no use to the others, and goes as soon as the view is searched.
-    let (surfaces, owns) = shown(estimates, views);
-    let given = owns.into_iter().zip(candidates).collect();
-    let searched = each_view(given, |view, (own, candidates): (Option<ViewEstimate>, Candidates)| {
-        let shown = Shown { surfaces: &|view| &surfaces[view], is_guided: own.is_some() };
-        let advance = |units| tracker.advance(units, searching(view));
-        stepper.search_from((cycle, view), own.as_ref(), shown, Some(&candidates), &advance)
+
+    // Reads the surfaces that the sources published. A view's own planes go as soon as it is searched.
+    let (previous, surfaces) = previous.take_surfaces();
+    let searched = previous.zip(candidates).map(|view, (own, candidates)| {
+        let problem = context.problem(at(view), surfaces.of_sources(context.sources(view)));
+        let input =
+            SearchInput { own: own.as_ref(), candidates: Some(&candidates), is_guided: own.is_some() };
+        let found = stages::search(context, at(view), &problem, input, &|units| searching(view, units))?;
+        let found = stages::fill_textureless(context, &problem, found);
+        Ok(stages::record_search(context, own.as_ref(), found))
     })?;
     drop(surfaces);
-    let found = some(&searched);
-    let verdicts = each_view(vec![(); views], |view, ()| {
-        let progress = stepper.all()[cycle].progress(Phase::Check, view, views);
-        stepper.check_with(cycle, view, &found, &|| tracker.advance(0, progress))
+
+    // Reads the searched planes of the sources.
+    let verdicts = searched.map_ref(|view, own| {
+        let sources = searched.planes_of_sources(context.sources(view));
+        stages::check(context, own, sources, &|units| checking(view, units))
     })?;
-    let searched = searched.into_iter().zip(&verdicts).collect();
-    each_view(searched, |view, (mut estimate, verdicts): (ViewEstimate, _)| {
-        stepper.mark(view, &mut estimate, verdicts)?;
-        estimate.forget_view_sets();
-        Ok(estimate)
+
+    // Every view by itself.
+    searched.zip(verdicts).map(|_, (own, verdicts)| {
+        let mut checked = stages::apply_check(own, &verdicts);
+        stages::correct_fattening(context, &mut checked);
+        stages::smooth_planes(context, &mut checked);
+        Ok(Some(stages::publish(context, checked)))
     })
 }
 
-/// Does the same to all views, some at a time. The threads share the work on one view, and while there is not enough of
-/// it for all of them they work on another one; more views at a time would take more memory.
-fn each_view<T: Send, R: Send>(views: Vec<T>, each: impl Fn(usize, T) -> Result<R> + Sync) -> Result<Vec<R>> {
-    let at_a_time = 1 + (rayon::current_num_threads() + THREADS_PER_VIEW / 2) / THREADS_PER_VIEW;
-    let mut turns: Vec<Vec<(usize, T)>> = (0..at_a_time).map(|_| Vec::new()).collect();
-    for (view, input) in views.into_iter().enumerate() {
-        turns[view % at_a_time].push((view, input));
-    }
-    let one_by_one = |views: Vec<(usize, T)>| -> Result<Vec<(usize, R)>> {
-        views.into_iter().map(|(view, input)| Ok((view, each(view, input)?))).collect()
-    };
-    let done: Vec<_> = turns.into_par_iter().with_max_len(1).map(one_by_one).collect::<Result<_>>()?;
-    let mut done: Vec<(usize, R)> = done.into_iter().flatten().collect();
-    done.sort_unstable_by_key(|(view, _)| *view);
-    Ok(done.into_iter().map(|(_, result)| result).collect())
-}
+/// The end of a run: from the checked estimates of the last cycle to results.
+fn finish(
+    context: &RunContext,
+    estimates: Store<Option<ViewEstimate<Checked>>>,
+    tracker: &Tracker,
+) -> Result<Vec<ViewResult>> {
+    let at = |view| Place { cycle: context.cycles().len() - 1, view };
+    let advance = |view, units| tracker.advance(units, context.progress(Phase::Check, at(view)));
+    let estimates = estimates.all_known();
 
-/// What the estimates show of all views, empty before there are any, and the estimates without it.
-fn shown(estimates: Vec<ViewEstimate>, views: usize) -> (Vec<Vec<CompactPlane>>, Vec<Option<ViewEstimate>>) {
-    let mut estimates: Vec<Option<ViewEstimate>> = estimates.into_iter().map(Some).collect();
-    estimates.resize_with(views, || None);
-    let show = |estimate: &mut Option<ViewEstimate>| {
-        estimate.as_mut().map(|estimate| std::mem::take(&mut estimate.solved.surface)).unwrap_or_default()
-    };
-    (estimates.iter_mut().map(show).collect(), estimates)
-}
+    // Reads the surfaces that the sources published and, for the recheck, their planes as they were before averaging.
+    let filled = estimates.map_ref(|view, own| {
+        let problem = context.problem(at(view), estimates.surfaces_of_sources(context.sources(view)));
+        let averaged = stages::average_across_views(context, &problem, own);
+        let filled = stages::fill_gaps(context, at(view), &averaged);
+        let sources = estimates.planes_of_sources(context.sources(view));
+        stages::recheck(context, &problem, filled, sources, &|units| advance(view, units))
+    })?;
 
-/// The estimates of all views as the stepper take them.
-fn some(estimates: &[ViewEstimate]) -> Vec<Option<&ViewEstimate>> {
-    estimates.iter().map(Some).collect()
-}
-
-/// Settles what became of every pixel.
-fn finish(stepper: &Stepper, estimates: Vec<ViewEstimate>, tracker: &Tracker) -> Result<Vec<ViewResult>> {
-    let views = stepper.views();
-    let last = stepper.all().last().expect("options have a scale");
-    let advance = |view, units| tracker.advance(units, last.progress(Phase::Check, view, views));
-    let known = some(&estimates);
-    let closings =
-        each_view(vec![(); views], |view, ()| stepper.closings(view, &known, &|units| advance(view, units)))?;
-    // What closes the gaps is all that a view takes from other views' own estimates.
-    let (surfaces, owns) = shown(estimates, views);
-    let given = owns.into_iter().flatten().zip(closings).collect();
-    each_view(given, |view, (own, closings): (ViewEstimate, Vec<_>)| {
-        stepper.settle(&own, &|view| &surfaces[view], &closings, &|units| advance(view, units))
-    })
-}
-
-fn fuse(scene: &Scene, options: &Options, results: &[ViewResult], hook: Hook) -> Result<PointCloud> {
-    let overlaps = fusion::overlaps(results.len(), scene.points());
-    let views: Vec<FusionView> = (scene.views().iter().zip(results).zip(&overlaps))
-        .map(|((view, result), overlap)| FusionView {
-            camera: &view.camera,
-            maps: &result.estimate,
-            status: Some(&result.status),
-            picture: Some(&view.picture),
-            overlap,
-        })
-        .collect();
-    let hook = |at: &Progress| -> ControlFlow<()> {
-        hook(&Progress { done: 1.0 - FUSION_SHARE * (1.0 - at.done), ..*at })
-    };
-    fusion::fuse(&views, &options.fusion, &hook)
+    // Reads the surfaces that the sources published. Averages once more: the averaged planes of all views, kept since their
+    // gaps were filled, would take half as much memory again.
+    let (estimates, surfaces) = estimates.take_surfaces();
+    let results = estimates.zip(filled).map(|view, (own, filled)| {
+        let problem = context.problem(at(view), surfaces.of_sources(context.sources(view)));
+        let mut planes = stages::average_across_views(context, &problem, &own);
+        filled.write_to(&mut planes);
+        stages::classify(context, &problem, own, planes, &|units| advance(view, units))
+    })?;
+    Ok(results.into_vec())
 }

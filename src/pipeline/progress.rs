@@ -1,16 +1,18 @@
-//! How a host follows a run and stops it.
+//! How a host follows a run and cancels it.
 
+use crate::error::{Error, Result};
+use crate::scene::Scene;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// What a run is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
-    /// Bees search the solutions of a view.
+    /// The planes of a view are searched.
     Search,
-    /// Views check each other's solutions.
+    /// Views are checked against each other, and finished.
     Check,
-    /// Maps become points.
+    /// Maps are fused into points.
     Fusion,
 }
 
@@ -25,53 +27,76 @@ impl Phase {
     }
 }
 
-/// Where a run stands.
+/// How far a run is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
-    /// What is being done.
+    /// What is done now.
     pub phase: Phase,
     /// Size of the images searched: 1 is full, 2 half, 4 a quarter.
     pub downscale: u32,
     /// The cycle on this scale, counted from 0.
     pub cycle: u32,
-    /// The view at work, counted from 0.
+    /// The view that is worked on, counted from 0.
     pub view: usize,
     /// Number of views.
     pub views: usize,
-    /// Share of the whole run that is done, 0 to 1. Cycles that the stopping rule skips count as done.
+    /// Fraction of the whole call that is done, 0 to 1. Cycles that are skipped because a scale ended early count as done.
     pub done: f64,
 }
 
-/// A host's hook: called often, from any worker thread, several calls may run at once; it must be quick.
-/// `Break` cancels the run, which then ends with [`crate::Error::Cancelled`] well within a second.
-pub type Hook<'a> = &'a (dyn Fn(&Progress) -> ControlFlow<()> + Sync);
+/// The callback of a host, for progress and for cancelling: called often, from any worker thread, several calls may run at
+/// once; it must be quick. `Break` cancels the call, which then ends with [`crate::Error::Cancelled`] well within a second.
+pub type ProgressFn<'a> = &'a (dyn Fn(&Progress) -> ControlFlow<()> + Sync);
 
-/// The hook of a host that neither looks nor stops.
+/// The callback of a host that neither watches nor cancels.
 pub fn ignore_progress(_: &Progress) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-/// Asked now and then by whatever takes longer than a moment, from any thread; `true` cancels it.
-pub(crate) type Cancelled<'a> = &'a (dyn Fn() -> bool + Sync);
+impl Progress {
+    /// Before the first cycle.
+    pub(super) fn start(scene: &Scene) -> Progress {
+        let views = scene.views().len();
+        Progress { phase: Phase::Search, downscale: 1, cycle: 0, view: 0, views, done: 0.0 }
+    }
+}
 
-/// Counts the work of a run and tells the hook.
-pub(crate) struct Tracker<'a> {
-    hook: Hook<'a>,
-    total: u64,
+/// Part of a whole run's work that fusion is estimated at.
+const FUSION_SHARE: f64 = 0.03;
+
+/// Counts the work of a call and reports it to the host.
+pub struct Tracker<'a> {
+    progress: ProgressFn<'a>,
+    /// Units of work of the whole call.
+    total: f64,
     done: AtomicU64,
     cancelled: AtomicBool,
 }
 
 impl<'a> Tracker<'a> {
-    /// A tracker of `total` units of work.
-    pub fn new(hook: Hook<'a>, total: u64) -> Tracker<'a> {
-        Tracker { hook, total: total.max(1), done: AtomicU64::new(0), cancelled: AtomicBool::new(false) }
+    /// A tracker of a whole run, whose work is not known yet.
+    pub fn new(progress: ProgressFn<'a>) -> Tracker<'a> {
+        Tracker::with_work(progress, 0)
     }
 
-    /// Adds finished work and reports where the run stands; `true` when the host wants to stop.
-    pub fn advance(&self, units: u64, at: Progress) -> bool {
+    /// A tracker of a call of so many units of work.
+    pub fn with_work(progress: ProgressFn<'a>, units: u64) -> Tracker<'a> {
+        let (done, cancelled) = (AtomicU64::new(0), AtomicBool::new(false));
+        Tracker { progress, total: units.max(1) as f64, done, cancelled }
+    }
+
+    /// Sets the work of a whole run before fusion.
+    pub fn set_work(&mut self, units: u64) {
+        self.total = units.max(1) as f64 / (1.0 - FUSION_SHARE);
+    }
+
+    /// Adds finished work and reports where the call is.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] once the host has cancelled.
+    pub fn advance(&self, units: u64, at: Progress) -> Result<()> {
         let done = self.done.fetch_add(units, Ordering::Relaxed) + units;
-        self.report(done, at)
+        self.report(&Progress { done: (done as f64 / self.total).min(1.0), ..at })
     }
 
     /// Sets the finished work, when some was skipped.
@@ -79,12 +104,16 @@ impl<'a> Tracker<'a> {
         self.done.store(units, Ordering::Relaxed);
     }
 
-    fn report(&self, done: u64, at: Progress) -> bool {
-        let done = (done as f64 / self.total as f64).min(1.0);
-        if (self.hook)(&Progress { done, ..at }).is_break() {
+    /// Reports the fusion at the end of a whole run; `at` is the progress of the fusion alone.
+    pub fn report_fusion(&self, at: &Progress) -> ControlFlow<()> {
+        (self.progress)(&Progress { done: 1.0 - FUSION_SHARE * (1.0 - at.done), ..*at })
+    }
+
+    fn report(&self, at: &Progress) -> Result<()> {
+        if (self.progress)(at).is_break() {
             self.cancelled.store(true, Ordering::Relaxed);
         }
-        self.cancelled.load(Ordering::Relaxed)
+        if self.cancelled.load(Ordering::Relaxed) { Err(Error::Cancelled) } else { Ok(()) }
     }
 }
 
@@ -97,37 +126,37 @@ mod tests {
         Progress { phase: Phase::Search, downscale: 2, cycle: 1, view: 3, views: 5, done: 0.0 };
 
     #[test]
-    fn the_hook_hears_the_share_that_is_done() {
-        let heard = Mutex::new(Vec::new());
+    fn the_host_is_told_the_fraction_that_is_done() {
+        let told = Mutex::new(Vec::new());
         let hook = |at: &Progress| {
             assert_eq!(Progress { done: 0.0, ..*at }, SOMEWHERE);
-            heard.lock().unwrap().push(at.done);
+            told.lock().unwrap().push(at.done);
             ControlFlow::Continue(())
         };
-        let tracker = Tracker::new(&hook, 8);
-        assert!(!tracker.advance(2, SOMEWHERE));
-        assert!(!tracker.advance(0, SOMEWHERE));
+        let tracker = Tracker::with_work(&hook, 8);
+        tracker.advance(2, SOMEWHERE).unwrap();
+        tracker.advance(0, SOMEWHERE).unwrap();
         tracker.jump_to(6);
-        tracker.advance(1, SOMEWHERE);
-        // Bands are rounded up: more than all is all.
-        tracker.advance(5, SOMEWHERE);
-        assert_eq!(*heard.lock().unwrap(), [0.25, 0.25, 0.875, 1.0]);
+        tracker.advance(1, SOMEWHERE).unwrap();
+        // Bands are rounded up: more than all work counts as all.
+        tracker.advance(5, SOMEWHERE).unwrap();
+        assert_eq!(*told.lock().unwrap(), [0.25, 0.25, 0.875, 1.0]);
     }
 
     #[test]
-    fn once_the_hook_broke_everybody_stops() {
+    fn once_the_host_has_cancelled_every_thread_ends() {
         let calls = AtomicU64::new(0);
         let hook = |_: &Progress| match calls.fetch_add(1, Ordering::Relaxed) {
             1 => ControlFlow::Break(()),
             _ => ControlFlow::Continue(()),
         };
-        let tracker = Tracker::new(&hook, 8);
-        assert_eq!([(); 4].map(|()| tracker.advance(1, SOMEWHERE)), [false, true, true, true]);
+        let tracker = Tracker::with_work(&hook, 8);
+        assert_eq!([(); 4].map(|()| tracker.advance(1, SOMEWHERE).is_err()), [false, true, true, true]);
     }
 
     #[test]
     fn a_run_without_work_is_reported_too() {
-        let tracker = Tracker::new(&ignore_progress, 0);
-        assert!(!tracker.advance(0, SOMEWHERE));
+        let tracker = Tracker::with_work(&ignore_progress, 0);
+        tracker.advance(0, SOMEWHERE).unwrap();
     }
 }

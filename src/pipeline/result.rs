@@ -14,7 +14,7 @@ pub struct CycleRecord {
     pub cycle: u32,
     /// Pixels searched.
     pub pixels: u64,
-    /// Pixels whose solution changed.
+    /// Pixels whose depth changed by more than a thousandth.
     pub changed: u64,
     /// Pixels validated by the check after it.
     pub validated: u64,
@@ -25,17 +25,17 @@ pub struct CycleRecord {
 pub struct ViewResult {
     /// Width of all maps in pixels.
     pub width: u32,
-    /// The raw estimate of every pixel that is not masked.
-    pub estimate: Maps,
-    /// Mean `1 - NCC` of the estimate over the pixel's view set, 0 to 2; lower is surer.
+    /// Depth and normal of every pixel that is not masked, validated or not.
+    pub raw: Maps,
+    /// Mean `1 - NCC` of the raw plane over the pixel's view set, 0 to 2; lower is more certain.
     pub cost: Vec<f32>,
-    /// What became of each pixel; `Validated` ones make the filtered maps.
+    /// Whether each pixel is validated, or why not.
     pub status: Vec<PixelStatus>,
     /// The view's source views, as indices into the scene; `view_sets` counts along this list.
     pub sources: Vec<u32>,
     /// The source views each pixel was matched with.
     pub view_sets: ViewSets,
-    /// Work done.
+    /// Work done for the view.
     pub counts: Counts,
     /// The cycles in order.
     pub cycles: Vec<CycleRecord>,
@@ -47,9 +47,9 @@ impl ViewResult {
         (self.width, (self.status.len() / (self.width as usize).max(1)) as u32)
     }
 
-    /// The maps with only what was validated left in them.
-    pub fn filtered(&self) -> Maps {
-        let mut maps = self.estimate.clone();
+    /// The maps of the validated pixels, empty elsewhere.
+    pub fn validated(&self) -> Maps {
+        let mut maps = self.raw.clone();
         for (pixel, status) in self.status.iter().enumerate() {
             if *status != PixelStatus::Validated {
                 maps.depth[pixel] = 0.0;
@@ -69,13 +69,13 @@ impl ViewResult {
     }
 }
 
-/// What a whole run hands out.
+/// The result of a whole run.
 #[derive(Debug, Clone)]
 pub struct Reconstruction {
     /// One result for each view of the scene.
     pub views: Vec<ViewResult>,
     /// The fused cloud.
     pub points: PointCloud,
-    /// What the host's user should know, in sentences.
+    /// What the user should know about the run, in sentences.
     pub warnings: Vec<String>,
 }

@@ -1,169 +1,174 @@
-//! Estimates as bytes: what a scheduler sends from machine to machine or keeps across a restart.
+//! Estimates as bytes, for a scheduler that sends them from machine to machine or keeps them across a restart.
+//!
+//! ```text
+//! magic, version   8 bytes
+//! header           view, cycle, stage (0 searched, 1 checked), pixels, words of a view set, records: u64
+//! counts           ncc_evaluations, bilinear_samples, early_terminations: u64
+//! records          downscale, cycle, pixels, changed, validated: u64, one for each cycle so far
+//! pixels           depth, normal x y z, cost: f32; consistent views, validated: u8; view set: u32 words (searched only)
+//! ```
+//!
+//! All numbers are little-endian. The published surface of a checked estimate is made from its planes.
 
-use super::estimate::{ViewEstimate, is_unit};
+use super::context::Place;
+use super::estimate::{AnyEstimate, Checked, Searched, ViewEstimate, is_unit};
+use super::result::CycleRecord;
 use super::stepper::Stepper;
 use crate::ambc::Counts;
 use crate::error::{Error, Result};
-use crate::geometry::Camera;
-use crate::geometry::ViewSets;
-use crate::pipeline::CycleRecord;
+use crate::geometry::{Camera, ViewSets};
 use crate::scene::{PixelEstimate, PlaneMap};
 use glam::Vec3;
 
 /// The first bytes of every estimate; the last is the version of the layout.
-const MAGIC: [u8; 8] = *b"skepst\0\x01";
+const MAGIC: [u8; 8] = *b"skepst\0\x02";
+/// Numbers of the header and the counts.
+const HEADER: usize = 9;
+/// Numbers of a record.
+const RECORD: usize = 5;
+/// Bytes of a pixel but for its view set.
+const PIXEL: usize = 22;
+/// The stages as the header names them.
+const SEARCHED: u64 = 0;
+const CHECKED: u64 = 1;
 
-impl ViewEstimate {
-    /// The estimate as bytes, all numbers little-endian. Only [`ViewEstimate::from_bytes`] of the same version of the crate is
-    /// meant to read them.
+impl ViewEstimate<Searched> {
+    /// The estimate as bytes, which [`AnyEstimate::from_bytes`] of the same version of the crate reads.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let PlaneMap { solutions, sets, .. } = &self.solved;
-        let words = sets.words_per_pixel();
-        let mut bytes = Vec::with_capacity(self.byte_len());
-        let mut put = |part: &[u8]| bytes.extend_from_slice(part);
-        put(&MAGIC);
-        for number in
-            [self.view, self.cycle, usize::from(self.marked), solutions.len(), words, self.cycles.len()]
-        {
-            put(&(number as u64).to_le_bytes());
-        }
-        let Counts { ncc_evaluations, bilinear_samples, early_terminations } = self.counts;
-        for count in [ncc_evaluations, bilinear_samples, early_terminations] {
-            put(&count.to_le_bytes());
-        }
-        for record in &self.cycles {
-            let CycleRecord { downscale, cycle, pixels, changed, validated } = *record;
-            for number in [u64::from(downscale), u64::from(cycle), pixels, changed, validated] {
-                put(&number.to_le_bytes());
-            }
-        }
-        for (pixel, solution) in solutions.iter().enumerate() {
-            let PixelEstimate { depth, normal, cost, .. } = *solution;
-            for number in [depth, normal.x, normal.y, normal.z, cost.into()] {
-                put(&number.to_le_bytes());
-            }
-            put(&[solution.consistent, u8::from(solution.validated)]);
-            for word in sets.words_of(pixel) {
-                put(&word.to_le_bytes());
-            }
-        }
-        bytes
+        to_bytes(self, SEARCHED, Some(self.view_sets()))
     }
 
     /// Length of [`ViewEstimate::to_bytes`].
     pub fn byte_len(&self) -> usize {
-        byte_len(self.pixels(), self.solved.sets.words_per_pixel(), self.cycles.len())
+        byte_len(self.pixels(), self.view_sets().words_per_pixel(), self.cycles.len())
+    }
+}
+
+impl ViewEstimate<Checked> {
+    /// The estimate as bytes, which [`AnyEstimate::from_bytes`] of the same version of the crate reads.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        to_bytes(self, CHECKED, None)
     }
 
+    /// Length of [`ViewEstimate::to_bytes`].
+    pub fn byte_len(&self) -> usize {
+        byte_len(self.pixels(), 0, self.cycles.len())
+    }
+}
+
+fn to_bytes<S>(estimate: &ViewEstimate<S>, stage: u64, view_sets: Option<&ViewSets>) -> Vec<u8> {
+    let ViewEstimate { at, map, counts, cycles, .. } = estimate;
+    let words = view_sets.map_or(0, ViewSets::words_per_pixel);
+    let mut bytes = Vec::with_capacity(byte_len(map.planes.len(), words, cycles.len()));
+    let mut put = |part: &[u8]| bytes.extend_from_slice(part);
+    put(&MAGIC);
+    let sizes = [map.planes.len(), words, cycles.len()].map(|size| size as u64);
+    let [pixels, words, records] = sizes;
+    for number in [at.view as u64, at.cycle as u64, stage, pixels, words, records] {
+        put(&number.to_le_bytes());
+    }
+    for count in [counts.ncc_evaluations, counts.bilinear_samples, counts.early_terminations] {
+        put(&count.to_le_bytes());
+    }
+    for record in cycles {
+        let CycleRecord { downscale, cycle, pixels, changed, validated } = *record;
+        for number in [u64::from(downscale), u64::from(cycle), pixels, changed, validated] {
+            put(&number.to_le_bytes());
+        }
+    }
+    for (pixel, plane) in map.planes.iter().enumerate() {
+        let PixelEstimate { depth, normal, cost, consistent_views, validated } = *plane;
+        for number in [depth, normal.x, normal.y, normal.z, cost.into()] {
+            put(&number.to_le_bytes());
+        }
+        put(&[consistent_views, u8::from(validated)]);
+        for word in view_sets.map_or(&[][..], |sets| sets.words_of(pixel)) {
+            put(&word.to_le_bytes());
+        }
+    }
+    bytes
+}
+
+impl AnyEstimate {
     /// The estimate that gave these bytes.
     ///
     /// # Errors
-    /// Bytes that are no estimate, or were cut; a estimate of another scene or other options as far as that shows: a view, cycle
-    /// or size there is not; values that no search can have found.
-    pub fn from_bytes(stepper: &Stepper, bytes: &[u8]) -> Result<ViewEstimate> {
+    /// Bytes that are no estimate, or were cut; an estimate of another scene or other options as far as that shows: a view,
+    /// cycle or size that does not exist; values that no search can have found.
+    pub fn from_bytes(stepper: &Stepper, bytes: &[u8]) -> Result<AnyEstimate> {
         let mut reader = Reader { rest: bytes };
-        let error = |value: String, expected: String| Error::argument("bytes", value, expected);
         if reader.take::<8>() != Some(MAGIC) {
-            return Err(error(
-                "no estimate".into(),
-                "bytes that a estimate of this version was saved to".into(),
-            ));
+            return Err(error("no estimate", "bytes that an estimate of this version was saved to"));
         }
-        let mut header = [0u64; 9];
+        let mut header = [0; HEADER];
         for number in &mut header {
-            *number = reader.u64().ok_or_else(|| error("cut in the header".into(), "all bytes".into()))?;
+            *number = reader.u64().ok_or_else(|| error("cut in the header", "all bytes"))?;
         }
         let [
             view,
             cycle,
-            marked,
+            stage,
             pixels,
             words,
-            cycles,
+            records,
             ncc_evaluations,
             bilinear_samples,
             early_terminations,
         ] = header;
-        let small = |number: u64| usize::try_from(number).unwrap_or(usize::MAX);
-        let (view, cycle, pixels, words, cycles) =
-            (small(view), small(cycle), small(pixels), small(words), small(cycles));
+        let [view, cycle, pixels, words, records] =
+            [view, cycle, pixels, words, records].map(|number| usize::try_from(number).unwrap_or(usize::MAX));
+        let at = Place { cycle, view };
         let (width, height) = stepper.size(cycle, view).map_err(|reason| {
-            error(format!("a estimate of view {view} after cycle {cycle}"), format!("another: {reason}"))
+            error(format!("an estimate of view {view} in cycle {cycle}"), format!("another: {reason}"))
         })?;
         let sources = stepper.sources(view).len();
-        if pixels != width as usize * height as usize
-            || words != ViewSets::empty(0, sources).words_per_pixel()
-            || marked > 1
-        {
-            let expected = format!("a estimate of {width} x {height} pixels over {sources} source views");
-            return Err(error(
-                format!("a estimate of {pixels} pixels with {words} words of views"),
-                expected,
-            ));
+        let expected_words =
+            if stage == SEARCHED { ViewSets::empty(0, sources).words_per_pixel() } else { 0 };
+        if pixels != width as usize * height as usize || words != expected_words || stage > CHECKED {
+            let expected = format!("an estimate of {width} x {height} pixels over {sources} source views");
+            return Err(error(format!("stage {stage}, {pixels} pixels, {words} words of views"), expected));
         }
-        if cycles > stepper.all().len() || bytes.len() != byte_len(pixels, words, cycles) {
-            let expected = format!("{} bytes", byte_len(pixels, words, cycles.min(stepper.all().len())));
+        let most_records = stepper.cycles().len();
+        if records > most_records || bytes.len() != byte_len(pixels, words, records) {
+            let expected = format!("{} bytes", byte_len(pixels, words, records.min(most_records)));
             return Err(error(format!("{} bytes", bytes.len()), expected));
         }
-        let mut estimate = ViewEstimate {
-            view,
-            cycle,
-            marked: marked == 1,
-            solved: PlaneMap { sets: ViewSets::empty(pixels, sources), ..PlaneMap::default() },
-            counts: Counts { ncc_evaluations, bilinear_samples, early_terminations },
-            cycles: Vec::with_capacity(cycles),
-        };
         // The length was checked: none of what follows can be missing.
-        for _ in 0..cycles {
-            let record = [(); 5].map(|()| reader.u64().unwrap_or(0));
-            // No scale has more pixels, so that sums of these never overflow.
-            let most = u64::from(Camera::MAX_SIDE).pow(2);
-            if record.iter().any(|&number| number > most) {
-                return Err(error(format!("a cycle of {record:?}"), "what a search can report".into()));
-            }
-            let [downscale, cycle, pixels, changed, validated] = record;
-            let (downscale, cycle) = (downscale as u32, cycle as u32);
-            estimate.cycles.push(CycleRecord { downscale, cycle, pixels, changed, validated });
-        }
-        let mut verdicts = Vec::with_capacity(pixels);
+        let cycles = (0..records).map(|_| reader.record()).collect::<Result<_>>()?;
+        let mut view_sets = ViewSets::empty(pixels, sources);
+        let mut planes = Vec::with_capacity(pixels);
         for pixel in 0..pixels {
-            let [depth, x, y, z, cost] = [(); 5].map(|()| reader.f32().unwrap_or(0.0));
-            let [consistent, validated] = reader.take::<2>().unwrap_or([0; 2]);
-            let normal = Vec3::new(x, y, z);
-            let usual = depth.is_finite() && depth >= 0.0 && cost >= 0.0 && validated <= 1;
-            let fits = match depth > 0.0 {
-                true => is_unit(normal),
-                false => normal.is_finite() && validated == 0,
-            };
-            if !(usual && fits) {
+            planes.push(reader.plane().ok_or_else(|| {
                 let place = format!("column {}, row {}", pixel % width as usize, pixel / width as usize);
-                let value = format!("depth {depth}, normal {normal}, cost {cost} at {place}");
-                return Err(error(value, "what a search can find".into()));
-            }
-            verdicts.push((consistent, validated == 1));
-            estimate.solved.solutions.push(PixelEstimate {
-                depth,
-                normal,
-                cost: cost.into(),
-                ..PixelEstimate::default()
-            });
+                error(format!("a plane that no search can find at {place}"), "whole bytes")
+            })?);
             for word in 0..words {
                 let bits = u32::from_le_bytes(reader.take().unwrap_or([0; 4]));
                 for source in (word * 32..sources.min(word * 32 + 32)).filter(|s| bits >> (s % 32) & 1 != 0) {
-                    estimate.solved.sets.insert(pixel, source);
+                    view_sets.insert(pixel, source);
                 }
             }
         }
-        if estimate.marked {
-            estimate.solved.mark(&stepper.scaled(cycle, view).camera, &verdicts);
+        let counts = Counts { ncc_evaluations, bilinear_samples, early_terminations };
+        let map = PlaneMap { planes };
+        if stage == SEARCHED {
+            let stage = Searched { view_sets };
+            return Ok(AnyEstimate::Searched(ViewEstimate { at, map, counts, cycles, stage }));
         }
-        Ok(estimate)
+        let surface = map.publish(&stepper.context().scaled(at).camera);
+        let stage = Checked { surface };
+        Ok(AnyEstimate::Checked(ViewEstimate { at, map, counts, cycles, stage }))
     }
 }
 
-fn byte_len(pixels: usize, words: usize, cycles: usize) -> usize {
-    let header = MAGIC.len() + 9 * 8;
-    header.saturating_add(cycles.saturating_mul(40)).saturating_add(pixels.saturating_mul(22 + 4 * words))
+fn error(value: impl Into<String>, expected: impl Into<String>) -> Error {
+    Error::argument("bytes", value.into(), expected)
+}
+
+fn byte_len(pixels: usize, words: usize, records: usize) -> usize {
+    let header = MAGIC.len() + 8 * HEADER;
+    let records = records.saturating_mul(8 * RECORD);
+    header.saturating_add(records).saturating_add(pixels.saturating_mul(PIXEL + 4 * words))
 }
 
 /// Takes numbers off the front of bytes.
@@ -184,5 +189,37 @@ impl Reader<'_> {
 
     fn f32(&mut self) -> Option<f32> {
         self.take().map(f32::from_le_bytes)
+    }
+
+    fn record(&mut self) -> Result<CycleRecord> {
+        let record = [(); RECORD].map(|()| self.u64().unwrap_or(0));
+        // No scale has more pixels, so that sums of these never overflow.
+        let most = u64::from(Camera::MAX_SIDE).pow(2);
+        if record.iter().any(|&number| number > most) {
+            return Err(error(format!("a cycle of {record:?}"), "what a search can report"));
+        }
+        let [downscale, cycle, pixels, changed, validated] = record;
+        let (downscale, cycle) = (downscale as u32, cycle as u32);
+        Ok(CycleRecord { downscale, cycle, pixels, changed, validated })
+    }
+
+    /// A pixel's plane, `None` for one that no search can find.
+    fn plane(&mut self) -> Option<PixelEstimate> {
+        let [depth, x, y, z, cost] = [(); 5].map(|()| self.f32().unwrap_or(0.0));
+        let [consistent_views, validated] = self.take::<2>().unwrap_or([0; 2]);
+        let normal = Vec3::new(x, y, z);
+        let is_usual = depth.is_finite() && depth >= 0.0 && cost >= 0.0 && validated <= 1;
+        let fits = match depth > 0.0 {
+            true => is_unit(normal),
+            false => normal.is_finite() && validated == 0,
+        };
+        let validated = validated == 1;
+        (is_usual && fits).then_some(PixelEstimate {
+            depth,
+            normal,
+            cost: cost.into(),
+            consistent_views,
+            validated,
+        })
     }
 }

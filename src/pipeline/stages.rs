@@ -1,395 +1,378 @@
-//! The stepper of one view: propagation, search, check.
+//! The stages of a run, one function each: what it reads are its arguments, what it changes is what it returns or takes by
+//! `&mut`. The order is in [`pipeline`](super).
 
-use super::estimate::ViewEstimate;
-use super::stepper::Stepper;
-use crate::ambc::{Candidate, CostRules, FoodSource, OnlookerRules, Search, band_rows, stream};
-use crate::cross_view::consistency::{self, ConsistencyRules};
-use crate::cross_view::propagation::{self, Donor};
-use crate::error::{Error, Result};
+use super::context::{Place, RunContext};
+use super::estimate::{Checked, Searched, Unfilled, Unpublished, ViewEstimate, maps_of};
+use super::progress::Tracker;
+use super::result::{CycleRecord, ViewResult};
+use super::status;
+use super::store::{PublishedSurfaces, SourcePlanes};
+use crate::ambc::{Candidate, ConfidenceTask, CostRules, Counts, Search, SearchResult, SearchRules, stream};
+use crate::cross_view::{self, ConsistencyCheck, ConsistencyRules, Donor, Target};
+use crate::error::Result;
+use crate::fusion::{self, FusionView, PointCloud};
 use crate::geometry::ViewSets;
-use crate::matching::{Problem, Source};
-use crate::pipeline::CycleRecord;
-use crate::pipeline::{Cancelled, Hook, Phase, Tracker};
-use crate::refine::foreground_fattening::trim;
-use crate::refine::plane_smoothing::smooth;
-use crate::refine::textureless::fill;
-use crate::scene::CompactPlane;
-use crate::scene::ScaledView;
-use crate::scene::{PixelEstimate, PlaneMap};
+use crate::matching::Problem;
+use crate::options::Options;
+use crate::parallel::Advance;
+use crate::refine::Filter;
+use crate::refine::foreground_fattening::CorrectFattening;
+use crate::refine::gap_filling::FillGaps;
+use crate::refine::plane_smoothing::SmoothPlanes;
+use crate::refine::textureless::FillTextureless;
+use crate::scene::{PixelEstimate, PlaneMap, ScaledView, Scene, Verdict};
 use crate::view_selection::{ViewRules, select_sets};
 use rayon::prelude::*;
 
-/// The planes other views offer to the pixels of a view; nothing on a scale's first cycle or with propagation off.
+/// The planes that other views propagate to the pixels of a view; none in a scale's first cycle or with propagation off.
 #[derive(Debug, Clone)]
 pub struct Candidates {
-    cycle: usize,
-    view: usize,
+    pub(super) at: Place,
     /// Pixels of the view.
-    pixels: usize,
-    /// The pixels with an offer, a small part of all.
+    pub(super) pixels: usize,
+    /// The pixels with a candidate, a small part of all.
     planes: Vec<(u32, Candidate)>,
 }
 
 impl Candidates {
-    /// One offer a pixel; `None` where there are none at all.
+    /// One for each pixel; `None` where there are none at all.
     fn by_pixel(&self) -> Option<Vec<Candidate>> {
-        let mut all = vec![Candidate::default(); if self.planes.is_empty() { 0 } else { self.pixels }];
-        self.planes.iter().for_each(|&(pixel, offer)| all[pixel as usize] = offer);
-        (!all.is_empty()).then_some(all)
+        if self.planes.is_empty() {
+            return None;
+        }
+        let mut all = vec![Candidate::default(); self.pixels];
+        self.planes.iter().for_each(|&(pixel, candidate)| all[pixel as usize] = candidate);
+        Some(all)
     }
 }
 
-/// What a check says of every pixel of a view.
-#[derive(Debug, Clone)]
-pub struct Verdicts(Vec<(u8, bool)>);
-
-impl Stepper {
-    /// The planes other views offer to a view in a cycle.
-    ///
-    /// # Errors
-    /// A cycle or view there is not; estimates of another scale, scene or view than they stand for, or not yet marked.
-    pub fn propagate(
-        &self,
-        cycle: usize,
-        view: usize,
-        estimates: &[Option<&ViewEstimate>],
-    ) -> Result<Candidates> {
-        self.propagate_with(cycle, view, estimates, &|| false)
-    }
-
-    /// [`Stepper::propagate`] that can be cancelled.
-    pub(super) fn propagate_with(
-        &self,
-        cycle: usize,
-        view: usize,
-        estimates: &[Option<&ViewEstimate>],
-        cancelled: Cancelled,
-    ) -> Result<Candidates> {
-        self.check_states(cycle, view, estimates)?;
-        let target = estimates.get(view).copied().flatten();
-        let (Some(target), true, true) =
-            (target, self.options.search.view_propagation, self.all()[cycle].cycle > 0)
-        else {
-            return Ok(Candidates {
-                cycle,
-                view,
-                pixels: self.scaled(cycle, view).camera.pixels(),
-                planes: Vec::new(),
-            });
-        };
-        let mut donors = Vec::new();
-        for (donor, estimate) in estimates.iter().enumerate() {
-            let Some(estimate) = estimate else { continue };
-            estimate.require_marked(&format!("estimates[{donor}]"), true)?;
-            if self.sources(donor).contains(&(view as u32)) {
-                let camera = &self.scaled(cycle, donor).camera;
-                donors.push(Donor { view: donor, camera, map: &estimate.solved });
-            }
-        }
-        let ScaledView { camera, range, .. } = self.scaled(cycle, view);
-        let candidates = propagation::candidates(camera, &target.solved, *range, &donors, cancelled)?;
-        let planes = (0u32..).zip(candidates).filter(|(_, offer)| offer.depth > 0.0).collect();
-        Ok(Candidates { cycle, view, pixels: camera.pixels(), planes })
-    }
-
-    /// Searches a view in a cycle, starting from its own estimate, helped by what is validated in its sources and by
-    /// what is offered. Without a estimate of its own it starts at random.
-    ///
-    /// # Errors
-    /// What [`Stepper::propagate`] refuses; candidates to another view or for another cycle; [`Error::Cancelled`] when the hook
-    /// breaks.
-    pub fn search(
-        &self,
-        cycle: usize,
-        view: usize,
-        estimates: &[Option<&ViewEstimate>],
-        candidates: Option<&Candidates>,
-        hook: Hook,
-    ) -> Result<ViewEstimate> {
-        self.check_place(cycle, view)?;
-        let at = self.all()[cycle].progress(Phase::Search, view, self.views());
-        let tracker =
-            Tracker::new(hook, self.all()[cycle].work_on(self.scaled(cycle, view).camera.pixels() as u64));
-        self.check_states(cycle, view, estimates)?;
-        for (place, estimate) in estimates.iter().enumerate() {
-            estimate
-                .map_or(Ok(()), |estimate| estimate.require_marked(&format!("estimates[{place}]"), true))?;
-        }
-        if let Some(candidates) = candidates
-            && (candidates.cycle, candidates.view, candidates.pixels)
-                != (cycle, view, self.scaled(cycle, view).camera.pixels())
-        {
-            let value = format!("candidates to view {} for cycle {}", candidates.view, candidates.cycle);
-            let expected = format!("those to view {view} for cycle {cycle}, of the same stepper");
-            return Err(Error::argument("candidates", value, expected));
-        }
-        let own = estimates.get(view).copied().flatten();
-        let shown = Shown {
-            surfaces: &|view| surface_of(estimates, view),
-            is_guided: estimates.iter().any(Option::is_some),
-        };
-        self.search_from((cycle, view), own, shown, candidates, &|units| tracker.advance(units, at))
-    }
-
-    /// [`Stepper::search`] from a view's own estimate and what the other views show of theirs; hands finished units of work to
-    /// `advance`, which answers `true` to cancel.
-    pub(super) fn search_from<'b>(
-        &'b self,
-        (cycle, view): (usize, usize),
-        own: Option<&ViewEstimate>,
-        shown: Shown<'b>,
-        candidates: Option<&Candidates>,
-        advance: &(dyn Fn(u64) -> bool + Sync),
-    ) -> Result<ViewEstimate> {
-        let schedule = self.all()[cycle];
-        let ScaledView { camera, mask, .. } = self.scaled(cycle, view);
-        let mut estimate = ViewEstimate {
-            view,
-            cycle,
-            marked: false,
-            solved: PlaneMap::default(),
-            counts: own.map(ViewEstimate::counts).unwrap_or_default(),
-            cycles: own.map(|own| own.cycles.clone()).unwrap_or_default(),
-        };
-        if self.sources(view).is_empty() {
-            let solutions = vec![PixelEstimate::default(); camera.pixels()];
-            let sets = ViewSets::empty(solutions.len(), 0);
-            estimate.solved = PlaneMap { solutions, sets, ..PlaneMap::default() };
-        } else {
-            let start = own.map(|own| &own.solved.solutions[..]);
-            let candidates = candidates.and_then(Candidates::by_pixel);
-            let problem = self.problem(cycle, view, shown.surfaces);
-            // A band of one color has half of its pixels.
-            let band = camera.width as usize * band_rows(camera.height as usize);
-            let cancelled = || advance(band as u64 * u64::from(schedule.scale.food_sources) / 2);
-            let cycle_number = u64::from(schedule.cycle);
-            let search = Search {
-                mask: mask.as_deref(),
-                start,
-                candidates: candidates.as_deref(),
-                foods: schedule.scale.food_sources as usize,
-                iterations: schedule.iterations(),
-                around_start: self.around_start(schedule.cycle),
-                stream: stream(&[self.options.seed, view as u64, schedule.scale_index as u64, cycle_number]),
-                ..self.plain_search(cycle, &problem, shown.is_guided, &cancelled)
-            };
-            let mut found = search.run()?;
-            let filled = fill(&problem, &mut found.best, &found.weak);
-            let plane = |&pixel: &usize| {
-                let FoodSource { depth, normal, .. } = found.best[pixel];
-                (pixel, depth, normal)
-            };
-            let filled: Vec<_> = filled.iter().map(plane).collect();
-            select_sets(&problem, search.view_rules, &mut found.sets, &filled);
-            estimate.counts += found.counts;
-            let solution = |food: &FoodSource| PixelEstimate {
-                depth: food.depth,
-                normal: food.normal,
-                cost: food.cost.into(),
-                ..PixelEstimate::default()
-            };
-            estimate.solved = PlaneMap {
-                solutions: found.best.par_iter().map(solution).collect(),
-                sets: found.sets,
-                surface: Vec::new(),
-            };
-        }
-        let solutions = &estimate.solved.solutions;
-        estimate.cycles.push(CycleRecord {
-            downscale: schedule.downscale(),
-            cycle: schedule.cycle,
-            pixels: solutions.par_iter().filter(|solution| solution.depth > 0.0).count() as u64,
-            changed: count_changed(own.map_or(&[], |own| &own.solved.solutions), solutions),
-            validated: 0,
-        });
-        Ok(estimate)
-    }
-
-    /// The geometric consistency check of a view against what its sources have just found. A source whose estimate is
-    /// `None` cannot speak.
-    ///
-    /// # Errors
-    /// A cycle or view there is not; estimates of another scale, scene or view than they stand for, or already marked; no
-    /// estimate of the view itself.
-    pub fn check(&self, cycle: usize, view: usize, estimates: &[Option<&ViewEstimate>]) -> Result<Verdicts> {
-        self.check_with(cycle, view, estimates, &|| false)
-    }
-
-    /// [`Stepper::check`] that can be cancelled.
-    pub(super) fn check_with(
-        &self,
-        cycle: usize,
-        view: usize,
-        estimates: &[Option<&ViewEstimate>],
-        cancelled: Cancelled,
-    ) -> Result<Verdicts> {
-        self.check_states(cycle, view, estimates)?;
-        let Some(own) = estimates.get(view).copied().flatten() else {
-            return Err(missing(view));
-        };
-        own.require_marked(&format!("estimates[{view}]"), false)?;
-        let problem = self.problem(cycle, view, &|view| surface_of(estimates, view));
-        let sources = self.found_by_sources(view, estimates);
-        let rules = ConsistencyRules::new(&self.options);
-        Ok(Verdicts(consistency::check(self.level, &problem, &own.solved, &sources, &rules, cancelled)?))
-    }
-
-    /// What each source view of a view found, `None` of one without a estimate.
-    pub(super) fn found_by_sources<'b>(
-        &self,
-        view: usize,
-        estimates: &[Option<&'b ViewEstimate>],
-    ) -> Vec<Option<&'b PlaneMap>> {
-        let found = |&source: &u32| {
-            estimates.get(source as usize).copied().flatten().map(|estimate| &estimate.solved)
-        };
-        self.sources(view).iter().map(found).collect()
-    }
-
-    /// Writes the verdicts of a check into the estimate they were made for: what is validated guides the next search.
-    ///
-    /// # Errors
-    /// Another view than the estimate's; a estimate that is marked already or has another size.
-    pub fn mark(&self, view: usize, estimate: &mut ViewEstimate, verdicts: &Verdicts) -> Result<()> {
-        estimate.require_marked("estimate", false)?;
-        if estimate.view() != view || verdicts.0.len() != estimate.pixels() {
-            let value = format!("{} pixels of view {view}", verdicts.0.len());
-            let expected =
-                format!("the {} pixels of view {}, whose estimate it is", estimate.pixels(), estimate.view());
-            return Err(Error::argument("verdicts", value, expected));
-        }
-        let ScaledView { camera, image, range, .. } = self.scaled(estimate.cycle(), view);
-        estimate.solved.judge(&verdicts.0);
-        if self.may_end_scale(estimate) {
-            let is_last = estimate.cycle() + 1 == self.all().len();
-            trim(
-                camera,
-                image,
-                *range,
-                &mut estimate.solved.solutions,
-                self.options.refine.fattening_passes,
-                is_last,
-            );
-        }
-        for _ in 0..self.options.refine.smoothing_passes {
-            smooth(camera, image, *range, &mut estimate.solved.solutions);
-        }
-        estimate.solved.show(camera);
-        estimate.marked = true;
-        let validated = estimate.solved.validated();
-        if let Some(record) = estimate.cycles.last_mut() {
-            record.validated = validated;
-        }
-        Ok(())
-    }
-
-    /// Whether a scale ends with the cycle of a estimate, for all that the estimate knows.
-    fn may_end_scale(&self, estimate: &ViewEstimate) -> bool {
-        let scale = |cycle: usize| self.all().get(cycle).map(|cycle| cycle.scale_index);
-        let is_settled = |record: &CycleRecord| {
-            (record.changed as f64) < self.options.schedule.min_changed_fraction * record.pixels as f64
-        };
-        scale(estimate.cycle() + 1) != scale(estimate.cycle())
-            || estimate.cycles.last().is_some_and(is_settled)
-    }
-
-    /// A search with everything that all searches have in common; one that is guided has validated solutions to look at.
-    pub(super) fn plain_search<'b>(
-        &'b self,
-        cycle: usize,
-        problem: &'b Problem<'b>,
-        is_guided: bool,
-        cancelled: &'b (dyn Fn() -> bool + Sync),
-    ) -> Search<'b> {
-        // The paper starts no set again: its cost is infinite then.
-        let min_views = match self.options.cost.best_views {
-            0 => 0,
-            _ => self.options.min_matched_views(),
-        };
-        Search {
-            problem,
-            window: self.window(cycle),
-            cost_rules: CostRules::new(&self.options, is_guided),
-            view_rules: ViewRules::new(&self.options, min_views),
-            mask: None,
-            start: None,
-            candidates: None,
-            foods: 0,
-            iterations: 0,
-            trial_limit: self.options.search.trial_limit.min(u32::from(u16::MAX)) as u16,
-            employed_foods: self.employed_foods(is_guided),
-            onlookers: OnlookerRules {
-                reward: self.options.search.smoothness_reward as f32,
-                draws: self.options.search.onlooker_tournament_size,
-            },
-            plane_fit: self.options.search.local_plane_tolerance as f32,
-            focused_views: self.options.cost.max_views_per_pixel as usize,
-            around_start: (0.0, 0.0),
-            stream: 0,
-            level: self.level,
-            cancelled,
-        }
-    }
-
-    fn employed_foods(&self, is_guided: bool) -> usize {
-        match self.options.search.employed_bees {
-            count if is_guided && count > 0 => count as usize,
-            _ => usize::MAX,
-        }
-    }
-
-    fn around_start(&self, cycle: u32) -> (f32, f32) {
-        let shrink = 0.5f64.powi(cycle.min(64) as i32);
-        (
-            (self.options.search.depth_perturbation * shrink) as f32,
-            (self.options.search.normal_perturbation * shrink) as f32,
-        )
-    }
-
-    /// A view and its sources, which show their validated surfaces as far as there are any.
-    pub(super) fn problem<'b>(
-        &'b self,
-        cycle: usize,
-        view: usize,
-        surfaces: &dyn Fn(usize) -> &'b [CompactPlane],
-    ) -> Problem<'b> {
-        let ScaledView { camera, image, range, .. } = self.scaled(cycle, view);
-        let mut problem = Problem::new(camera, image, *range);
-        for &source in self.sources(view) {
-            let source = source as usize;
-            let ScaledView { camera: other, image, .. } = self.scaled(cycle, source);
-            problem.sources.push(Source::new(camera, other, image, surfaces(source)));
-        }
-        problem
-    }
+/// Takes an estimate to the scale of a cycle: each pixel gets the plane of its coarse pixel. One that is on that scale already
+/// stays as it is.
+pub fn upsample(
+    context: &RunContext,
+    at: Place,
+    own: Option<ViewEstimate<Checked>>,
+) -> Result<Option<ViewEstimate<Checked>>> {
+    let cycles = context.cycles();
+    let is_coarser =
+        |own: &ViewEstimate<Checked>| cycles[own.cycle()].scale_index < cycles[at.cycle].scale_index;
+    Ok(own.map(|own| if is_coarser(&own) { upsampled(context, at, &own) } else { own }))
 }
 
-/// What the views show of their estimates to a search.
+/// An estimate of the next coarser scale on the scale of a cycle.
+pub fn upsampled(context: &RunContext, at: Place, own: &ViewEstimate<Checked>) -> ViewEstimate<Checked> {
+    let (coarse, fine) = (context.scaled(own.at), context.scaled(at));
+    let map = own.map.upsample(&coarse.camera, &fine.camera, fine.range);
+    let surface = map.publish(&fine.camera);
+    ViewEstimate { at, map, counts: own.counts, cycles: own.cycles.clone(), stage: Checked { surface } }
+}
+
+/// The candidates for the pixels of a view without a validated plane: the consistent planes of the views that have it among
+/// their sources (section 5.6.1 of the paper).
+pub fn propagate(
+    context: &RunContext,
+    at: Place,
+    own: Option<&ViewEstimate<Checked>>,
+    donors: &[Donor],
+    advance: Advance,
+) -> Result<Candidates> {
+    let ScaledView { camera, range, .. } = context.scaled(at);
+    let is_on = context.options.search.view_propagation && context.cycles()[at.cycle].cycle > 0;
+    let candidates = match own.filter(|_| is_on) {
+        Some(own) => {
+            let target = Target { camera, planes: own.planes(), range: *range };
+            cross_view::candidates(&target, donors, advance)?
+        }
+        None => Vec::new(),
+    };
+    let planes = (0u32..).zip(candidates).filter(|(_, candidate)| candidate.depth > 0.0).collect();
+    Ok(Candidates { at, pixels: camera.pixels(), planes })
+}
+
+/// What a search starts from, besides the published surfaces of the sources.
 #[derive(Clone, Copy)]
-pub(super) struct Shown<'b> {
-    /// The validated surface of a view, empty where nothing is known.
-    pub surfaces: &'b (dyn Fn(usize) -> &'b [CompactPlane] + Sync),
-    /// Whether anything is known of any view.
+pub struct SearchInput<'a> {
+    /// The view's own estimate of the cycle before, on this scale; `None` starts at random.
+    pub own: Option<&'a ViewEstimate<Checked>>,
+    /// The planes of other views.
+    pub candidates: Option<&'a Candidates>,
+    /// Whether the estimate of any view is known.
     pub is_guided: bool,
 }
 
-/// What a view's estimate shows of it.
-pub(super) fn surface_of<'b>(estimates: &[Option<&'b ViewEstimate>], view: usize) -> &'b [CompactPlane] {
-    estimates.get(view).copied().flatten().map_or(&[], |estimate| &estimate.solved.surface)
-}
-
-/// The error of a cycle that needs the view's own estimate.
-pub(super) fn missing(view: usize) -> Error {
-    Error::argument(format!("estimates[{view}]"), "none", "the estimate of the view itself")
-}
-
-/// A solution changed when its depth moved by more than this share.
-const CHANGE: f32 = 1e-3;
-
-fn count_changed(before: &[PixelEstimate], after: &[PixelEstimate]) -> u64 {
-    let changed = |(pixel, solution): &(usize, &PixelEstimate)| {
-        let before = before.get(*pixel).map_or(0.0, |solution| solution.depth);
-        solution.depth > 0.0 && (solution.depth - before).abs() > CHANGE * solution.depth
+/// Searches the plane of every pixel (section 5 of the paper).
+pub fn search(
+    context: &RunContext,
+    at: Place,
+    problem: &Problem,
+    input: SearchInput,
+    advance: Advance,
+) -> Result<ViewEstimate<Unfilled>> {
+    let SearchInput { own, candidates, is_guided } = input;
+    let ScaledView { camera, mask, .. } = context.scaled(at);
+    let cycle = &context.cycles()[at.cycle];
+    let found = if problem.sources.is_empty() {
+        SearchResult::without_sources(camera.pixels())
+    } else {
+        let candidates = candidates.and_then(Candidates::by_pixel);
+        let names = [context.options.seed, at.view as u64, cycle.scale_index as u64, u64::from(cycle.cycle)];
+        let search = Search {
+            problem,
+            window: context.window(at.cycle),
+            rules: SearchRules::new(&context.options, &cycle.scale, cycle.cycle, is_guided),
+            mask: mask.as_deref(),
+            start: own.map(ViewEstimate::planes),
+            candidates: candidates.as_deref(),
+            random_stream: stream(&names),
+            level: context.level,
+            advance,
+        };
+        search.run()?
     };
-    after.par_iter().enumerate().filter(changed).count() as u64
+    let SearchResult { planes, view_sets, is_textureless, counts } = found;
+    let mut total = own.map(ViewEstimate::counts).unwrap_or_default();
+    total += counts;
+    Ok(ViewEstimate {
+        at,
+        map: PlaneMap { planes },
+        counts: total,
+        cycles: own.map(|own| own.cycles.clone()).unwrap_or_default(),
+        stage: Unfilled { view_sets, is_textureless },
+    })
+}
+
+/// Fills textureless regions from the planes around them; determines the view sets of the filled pixels. Reads the images of
+/// the sources.
+pub fn fill_textureless(
+    context: &RunContext,
+    problem: &Problem,
+    found: ViewEstimate<Unfilled>,
+) -> ViewEstimate<Searched> {
+    let cycle = &context.cycles()[found.cycle()];
+    let (mut searched, Unfilled { mut view_sets, is_textureless }) =
+        found.into_stage(Searched { view_sets: ViewSets::default() });
+    let planes = &mut searched.map.planes;
+    if !problem.sources.is_empty() {
+        let filter = FillTextureless { problem, is_textureless: &is_textureless };
+        let filled = filter.apply(&context.filtered_view(searched.at), planes);
+        let rules = SearchRules::new(&context.options, &cycle.scale, cycle.cycle, false).view_set;
+        select_sets(problem, rules, &mut view_sets, &pixels_with_planes(&filled, planes));
+    }
+    // In a search the flag says that a plane comes from a validated one; a verdict it gets from the check.
+    planes.par_iter_mut().for_each(|plane| plane.validated = false);
+    searched.stage.view_sets = view_sets;
+    searched
+}
+
+/// Relative difference of depths from which on a plane counts as changed.
+const CHANGED_DEPTH: f32 = 1e-3;
+
+/// Records the cycle: how many pixels have a plane, and how many planes changed since the cycle before.
+pub fn record_search(
+    context: &RunContext,
+    own: Option<&ViewEstimate<Checked>>,
+    mut searched: ViewEstimate<Searched>,
+) -> ViewEstimate<Searched> {
+    let (before, planes) = (own.map_or(&[][..], ViewEstimate::planes), searched.planes());
+    let has_changed = |(index, plane): &(usize, &PixelEstimate)| {
+        let before = before.get(*index).map_or(0.0, |plane| plane.depth);
+        plane.depth > 0.0 && (plane.depth - before).abs() > CHANGED_DEPTH * plane.depth
+    };
+    let cycle = &context.cycles()[searched.cycle()];
+    let record = CycleRecord {
+        downscale: cycle.scale.downscale,
+        cycle: cycle.cycle,
+        pixels: planes.par_iter().filter(|plane| plane.depth > 0.0).count() as u64,
+        changed: planes.par_iter().enumerate().filter(has_changed).count() as u64,
+        validated: 0,
+    };
+    searched.cycles.push(record);
+    searched
+}
+
+/// Checks the planes of a view against the searched planes of its sources (section 5.6 of the paper).
+pub fn check(
+    context: &RunContext,
+    own: &ViewEstimate<Searched>,
+    sources: SourcePlanes<Searched>,
+    advance: Advance,
+) -> Result<Vec<Verdict>> {
+    let check = ConsistencyCheck {
+        problem: &context.problem(own.at, PublishedSurfaces::none(context.sources(own.view()))),
+        planes: own.planes(),
+        view_sets: own.view_sets(),
+        sources: sources.into_vec(),
+        rules: ConsistencyRules::new(&context.options.check),
+        level: context.level,
+        advance,
+    };
+    check.run()
+}
+
+/// Writes the verdicts of a check into the planes they were made for.
+pub fn apply_check(own: ViewEstimate<Searched>, verdicts: &[Verdict]) -> ViewEstimate<Unpublished> {
+    let (mut checked, _) = own.into_stage(Unpublished);
+    checked.map.set_verdicts(verdicts);
+    checked
+}
+
+/// Corrects foreground fattening where a scale may end: changes depths, normals and, in the last cycle, verdicts of validated
+/// pixels at edges.
+pub fn correct_fattening(context: &RunContext, own: &mut ViewEstimate<Unpublished>) {
+    if context.may_end_scale(own) {
+        let filter = CorrectFattening {
+            passes: context.options.refine.fattening_passes,
+            is_last_cycle: own.cycle() + 1 == context.cycles().len(),
+        };
+        filter.apply(&context.filtered_view(own.at), &mut own.map.planes);
+    }
+}
+
+/// Smooths validated planes: changes their depths and normals.
+pub fn smooth_planes(context: &RunContext, own: &mut ViewEstimate<Unpublished>) {
+    let filter = SmoothPlanes { passes: context.options.refine.smoothing_passes };
+    filter.apply(&context.filtered_view(own.at), &mut own.map.planes);
+}
+
+/// Publishes the validated planes to other views, and records their number.
+pub fn publish(context: &RunContext, own: ViewEstimate<Unpublished>) -> ViewEstimate<Checked> {
+    let surface = own.map.publish(&context.scaled(own.at).camera);
+    let (mut checked, Unpublished) = own.into_stage(Checked { surface });
+    let validated = checked.map.count_validated();
+    if let Some(record) = checked.cycles.last_mut() {
+        record.validated = validated;
+    }
+    checked
+}
+
+/// The planes of a view, the validated ones averaged with the published surfaces of its sources.
+pub fn average_across_views(
+    context: &RunContext,
+    problem: &Problem,
+    own: &ViewEstimate<Checked>,
+) -> Vec<PixelEstimate> {
+    match context.options.refine.cross_view_averaging {
+        true => cross_view::average(context.level, problem, own.planes()),
+        false => own.planes().to_vec(),
+    }
+}
+
+/// Planes for pixels of small gaps.
+pub struct FilledGaps(Vec<(u32, PixelEstimate)>);
+
+impl FilledGaps {
+    /// Writes them to the planes of their view.
+    pub fn write_to(&self, planes: &mut [PixelEstimate]) {
+        self.0.iter().for_each(|&(pixel, plane)| planes[pixel as usize] = plane);
+    }
+}
+
+/// Planes, not validated yet, for the pixels of small gaps from the planes around them.
+pub fn fill_gaps(context: &RunContext, at: Place, averaged: &[PixelEstimate]) -> FilledGaps {
+    if !context.options.refine.fill_gaps {
+        return FilledGaps(Vec::new());
+    }
+    let mut planes = averaged.to_vec();
+    let filled = FillGaps.apply(&context.filtered_view(at), &mut planes);
+    FilledGaps(filled.into_iter().map(|pixel| (pixel, planes[pixel as usize])).collect())
+}
+
+/// Those of the filled planes that the planes of the sources, as they were before averaging, validate more closely than the
+/// check asks for.
+pub fn recheck(
+    context: &RunContext,
+    problem: &Problem,
+    filled: FilledGaps,
+    sources: SourcePlanes<Checked>,
+    advance: Advance,
+) -> Result<FilledGaps> {
+    if filled.0.is_empty() {
+        return Ok(filled);
+    }
+    let pixels = problem.image.width * problem.image.height;
+    let mut planes = vec![PixelEstimate::default(); pixels];
+    filled.write_to(&mut planes);
+    let mut view_sets = ViewSets::empty(pixels, problem.sources.len());
+    let indices: Vec<u32> = filled.0.iter().map(|&(pixel, _)| pixel).collect();
+    let rules = ViewRules::new(&context.options, 0);
+    select_sets(problem, rules, &mut view_sets, &pixels_with_planes(&indices, &planes));
+    let check = ConsistencyCheck {
+        problem,
+        planes: &planes,
+        view_sets: &view_sets,
+        sources: sources.into_vec(),
+        rules: ConsistencyRules::new(&context.options.check).for_recheck(),
+        level: context.level,
+        advance,
+    };
+    let verdicts = check.run()?;
+    let confirmed = filled.0.into_iter().filter_map(|(pixel, plane)| {
+        let (consistent_views, validated) = verdicts[pixel as usize];
+        validated.then_some((pixel, PixelEstimate { consistent_views, validated, ..plane }))
+    });
+    Ok(FilledGaps(confirmed.collect()))
+}
+
+/// Determines view set, confidence and status of every pixel.
+pub fn classify(
+    context: &RunContext,
+    problem: &Problem,
+    own: ViewEstimate<Checked>,
+    planes: Vec<PixelEstimate>,
+    advance: Advance,
+) -> Result<ViewResult> {
+    let confidence = ConfidenceTask {
+        problem,
+        window: context.window(own.cycle()),
+        cost: CostRules::new(&context.options, false),
+        // A set that falls back to all views would hide that none sees the plane.
+        view_set: ViewRules::new(&context.options, 0),
+        level: context.level,
+        advance,
+    };
+    let confidence = confidence.run(&planes)?;
+    let view = context.scaled(own.at);
+    let status = status::classify(view, &planes, &confidence, context.options.min_matched_views());
+    let mut counts: Counts = own.counts;
+    counts += confidence.counts;
+    Ok(ViewResult {
+        width: view.camera.width,
+        raw: maps_of(&planes),
+        status,
+        cost: confidence.cost,
+        sources: context.sources(own.view()).to_vec(),
+        view_sets: confidence.view_sets,
+        counts,
+        cycles: own.cycles,
+    })
+}
+
+/// Fuses the validated pixels of all views into points (section 6 of the paper). Reads the results of the views that saw a
+/// sparse point together with a view.
+pub fn fuse(
+    scene: &Scene,
+    options: &Options,
+    results: &[ViewResult],
+    tracker: &Tracker,
+) -> Result<PointCloud> {
+    let overlaps = fusion::overlaps(results.len(), scene.points());
+    let views: Vec<FusionView> = (scene.views().iter().zip(results).zip(&overlaps))
+        .map(|((view, result), overlap)| FusionView {
+            camera: &view.camera,
+            maps: &result.raw,
+            status: Some(&result.status),
+            picture: Some(&view.picture),
+            overlap,
+        })
+        .collect();
+    fusion::fuse(&views, &options.fusion, &|at| tracker.report_fusion(at))
+}
+
+/// Pixels with depth and normal.
+fn pixels_with_planes(pixels: &[u32], planes: &[PixelEstimate]) -> Vec<(usize, f32, glam::Vec3)> {
+    let with_plane = |&pixel: &u32| {
+        let PixelEstimate { depth, normal, .. } = planes[pixel as usize];
+        (pixel as usize, depth, normal)
+    };
+    pixels.iter().map(with_plane).collect()
 }

@@ -1,42 +1,39 @@
-//! The reason for every pixel without a validated solution, so that an empty cloud explains itself.
+//! The status of every pixel: validated, or the reason why not, so that an empty cloud explains itself.
 
-use crate::ambc::Assessment;
-use crate::scene::PixelEstimate;
-use crate::scene::PixelStatus;
-use crate::scene::ScaledView;
+use crate::ambc::Confidence;
+use crate::geometry::SearchRange;
+use crate::scene::{PixelEstimate, PixelStatus, ScaledView};
 
-/// A solution this close to an end of the depth range was stopped by it.
+/// Relative distance to an end of the depth range within which a depth counts as stopped by it.
 const AT_RANGE_END: f32 = 1e-3;
 
-/// What became of each pixel of a view with this many source views, of which a solution must be seen in `needed`.
+/// The status of each pixel of a view; a plane must be visible in `min_views` source views to be validated.
 pub fn classify(
     view: &ScaledView,
-    solutions: &[PixelEstimate],
-    assessment: &Assessment,
-    sources: usize,
-    needed: usize,
+    planes: &[PixelEstimate],
+    confidence: &Confidence,
+    min_views: usize,
 ) -> Vec<PixelStatus> {
-    let (near, far) = (view.range.near as f32, view.range.far as f32);
-    let status = |pixel: usize| {
-        let solution = &solutions[pixel];
+    let SearchRange { near, far } = view.range.into();
+    let is_at_end = |depth: f32| depth < near * (1.0 + AT_RANGE_END) || depth > far * (1.0 - AT_RANGE_END);
+    let status = |(pixel, plane): (usize, &PixelEstimate)| {
         if view.mask.as_ref().is_some_and(|mask| !mask[pixel]) {
             PixelStatus::Masked
-        } else if solution.validated {
+        } else if plane.validated {
             PixelStatus::Validated
-        } else if sources < needed || solution.depth <= 0.0 {
+        } else if confidence.sources < min_views || plane.depth <= 0.0 {
             PixelStatus::NoSources
-        } else if !assessment.textured[pixel] {
+        } else if !confidence.has_texture[pixel] {
             PixelStatus::NoTexture
-        } else if assessment.sets.count(pixel) < needed {
+        } else if confidence.view_sets.count(pixel) < min_views {
             PixelStatus::NoSources
-        } else if solution.depth < near * (1.0 + AT_RANGE_END) || solution.depth > far * (1.0 - AT_RANGE_END)
-        {
+        } else if is_at_end(plane.depth) {
             PixelStatus::OutOfRange
         } else {
             PixelStatus::Inconsistent
         }
     };
-    (0..solutions.len()).map(status).collect()
+    planes.iter().enumerate().map(status).collect()
 }
 
 #[cfg(test)]
@@ -49,34 +46,34 @@ mod tests {
     #[test]
     fn every_pixel_has_the_reason_that_comes_first() {
         let world = World::five();
-        let mut estimates = world.exact();
-        let estimate = &mut estimates[0];
-        let pixels = estimate.solutions.len();
+        let map = &mut world.exact()[0];
+        let pixels = map.planes.len();
         let mut mask = vec![true; pixels];
-        let mut assessment = Assessment {
+        let mut confidence = Confidence {
             cost: vec![0.0; pixels],
-            textured: vec![true; pixels],
-            sets: ViewSets::full(pixels, 4),
+            has_texture: vec![true; pixels],
+            sources: 4,
+            view_sets: ViewSets::full(pixels, 4),
             counts: Counts::default(),
         };
         let mut expected = vec![PixelStatus::Inconsistent; pixels];
 
         (mask[0], expected[0]) = (false, PixelStatus::Masked);
-        estimate.solutions[0].depth = 0.0;
-        (estimate.solutions[1].validated, expected[1]) = (true, PixelStatus::Validated);
-        (assessment.textured[2], expected[2]) = (false, PixelStatus::NoTexture);
-        (estimate.solutions[3].depth, expected[3]) = (RANGE.near as f32, PixelStatus::OutOfRange);
-        (estimate.solutions[4].depth, expected[4]) = (RANGE.far as f32, PixelStatus::OutOfRange);
-        (estimate.solutions[5].depth, expected[5]) = (RANGE.far as f32 * 0.99, PixelStatus::Inconsistent);
-        (estimate.solutions[6].depth, expected[6]) = (0.0, PixelStatus::NoSources);
+        map.planes[0].depth = 0.0;
+        (map.planes[1].validated, expected[1]) = (true, PixelStatus::Validated);
+        (confidence.has_texture[2], expected[2]) = (false, PixelStatus::NoTexture);
+        (map.planes[3].depth, expected[3]) = (RANGE.near as f32, PixelStatus::OutOfRange);
+        (map.planes[4].depth, expected[4]) = (RANGE.far as f32, PixelStatus::OutOfRange);
+        (map.planes[5].depth, expected[5]) = (RANGE.far as f32 * 0.99, PixelStatus::Inconsistent);
+        (map.planes[6].depth, expected[6]) = (0.0, PixelStatus::NoSources);
         let mut sets = ViewSets::empty(pixels, 4);
         for pixel in 0..pixels {
             (0..if pixel == 7 { 1 } else { 2 }).for_each(|source| sets.insert(pixel, source));
         }
-        (assessment.sets, expected[7]) = (sets, PixelStatus::NoSources);
+        (confidence.view_sets, expected[7]) = (sets, PixelStatus::NoSources);
         // Validated is validated, whatever else.
-        (estimate.solutions[8].validated, expected[8]) = (true, PixelStatus::Validated);
-        assessment.textured[8] = false;
+        (map.planes[8].validated, expected[8]) = (true, PixelStatus::Validated);
+        confidence.has_texture[8] = false;
 
         let view = ScaledView {
             camera: world.cameras[0],
@@ -84,10 +81,10 @@ mod tests {
             mask: Some(mask),
             range: RANGE,
         };
-        assert_eq!(classify(&view, &estimate.solutions, &assessment, 4, 2), expected);
+        assert_eq!(classify(&view, &map.planes, &confidence, 2), expected);
         // With a single source no pixel can be validated: that is the reason.
-        estimate.solutions.iter_mut().for_each(|solution| solution.validated = false);
-        let lonely = classify(&view, &estimate.solutions, &assessment, 1, 2);
-        assert!(lonely[0] == PixelStatus::Masked && lonely[1..].iter().all(|&o| o == PixelStatus::NoSources));
+        map.planes.iter_mut().for_each(|plane| plane.validated = false);
+        let alone = classify(&view, &map.planes, &Confidence { sources: 1, ..confidence }, 2);
+        assert!(alone[0] == PixelStatus::Masked && alone[1..].iter().all(|&o| o == PixelStatus::NoSources));
     }
 }

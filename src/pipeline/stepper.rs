@@ -1,40 +1,38 @@
-//! What all stepper of a run share, and the order they are taken in.
+//! A run taken apart: the public stepwise interface. Checks what the host passes and calls the stages.
 
+use super::context::{Place, RunContext};
 use super::cycle::Cycle;
-use super::estimate::ViewEstimate;
+use super::estimate::{Checked, EstimateRef, Searched, ViewEstimate};
+use super::progress::{Phase, ProgressFn, Tracker};
+use super::result::ViewResult;
+use super::stages::{self, Candidates, SearchInput};
+use super::store::{PublishedSurfaces, SourcePlanes};
 use crate::error::{Error, Result};
-use crate::matching::Window;
 use crate::options::Options;
-use crate::pipeline::Cancelled;
-use crate::scene::ScaledView;
 use crate::scene::Scene;
-use crate::simd::SimdLevel;
-use crate::view_selection::{SourceLists, source_lists};
-use rayon::prelude::*;
 
 /// A run taken apart, for hosts that schedule views themselves, on this machine or on many, or bring maps of their own.
 ///
-/// A run is, for each cycle from [`Stepper::all`]: [`propagate`](Stepper::propagate) and [`search`](Stepper::search) every
-/// view from the estimates the cycle before left; [`check`](Stepper::check) every view against what all have just found and
-/// [`mark`](Stepper::mark) it; ask [`next`](Stepper::next) for the next cycle, and [`upsample`](Stepper::upsample) the estimates
-/// when it is on a finer scale. After the last, [`finish`](Stepper::finish) every view and fuse. Done so for all views,
-/// that gives the same bits as [`reconstruct`](crate::reconstruct).
+/// A run is, for each cycle from [`Stepper::cycles`]:
 ///
-/// The estimates of other views are passed as one entry for each view of the scene. Only the view itself, its sources and
-/// the views it is a source of are looked at; `None` says that nothing is known of a view.
+/// 1. [`upsample`](Stepper::upsample) the estimates when the cycle is on a finer scale;
+/// 2. [`propagate`](Stepper::propagate) to and [`search`](Stepper::search) every view, from the checked estimates of the cycle
+///    before;
+/// 3. [`check`](Stepper::check) every view against the searched estimates of this cycle;
+/// 4. ask [`next`](Stepper::next) for the next cycle.
 ///
-/// Nothing here changes after it is made: stepper of different views may be taken at the same time from several threads.
-/// They run on the rayon pool they are called on.
-pub struct Stepper {
-    pub(super) options: Options,
-    pub(super) level: SimdLevel,
-    /// By scale.
-    windows: Vec<Window>,
-    pub(super) sources: SourceLists,
-    stepper: Vec<Cycle>,
-    /// By scale and view.
-    scaled: Vec<Vec<ScaledView>>,
-}
+/// After the last, [`finish`](Stepper::finish) every view and fuse. Done so for all views, that gives the same bits as
+/// [`reconstruct`](crate::reconstruct).
+///
+/// The estimates of other views are passed as one entry for each view of the scene; `None` says that nothing is known of a
+/// view. Each call reads only those that its documentation names.
+///
+/// Nothing here changes after it is made: calls for different views may run at the same time from several threads. They run
+/// on the rayon pool they are called on.
+pub struct Stepper(RunContext);
+
+/// One entry for each view of the scene.
+type Known<'a, S> = &'a [Option<&'a ViewEstimate<S>>];
 
 impl Stepper {
     /// Prepares the images of all scales, and chooses the source views.
@@ -42,199 +40,232 @@ impl Stepper {
     /// # Errors
     /// An option out of its range, named.
     pub fn new(scene: &Scene, options: &Options) -> Result<Stepper> {
-        Stepper::new_with(scene, options, &|| false)
+        RunContext::new(scene, options, &|_| Ok(())).map(Stepper)
     }
 
-    /// [`Stepper::new`] that can be cancelled.
-    pub(super) fn new_with(scene: &Scene, options: &Options, cancelled: Cancelled) -> Result<Stepper> {
-        options.check()?;
-        Ok(Stepper {
-            options: options.clone(),
-            level: options.simd.unwrap_or_else(SimdLevel::detect),
-            windows: (0..options.schedule.scales.len()).map(|scale| window(options, scale)).collect(),
-            sources: source_lists(scene, options),
-            stepper: Cycle::all(options),
-            scaled: (options.schedule.scales.iter())
-                .map(|scale| {
-                    let views = (0..scene.views().len()).into_par_iter();
-                    let of = |view| match cancelled() {
-                        true => Err(Error::Cancelled),
-                        false => Ok(ScaledView::of(scene, view, scale.downscale)),
-                    };
-                    views.map(of).collect()
-                })
-                .collect::<Result<_>>()?,
-        })
-    }
-
-    /// The stepper in order.
-    pub fn all(&self) -> &[Cycle] {
-        &self.stepper
+    /// The cycles in order.
+    pub fn cycles(&self) -> &[Cycle] {
+        self.0.cycles()
     }
 
     /// Number of views.
     pub fn views(&self) -> usize {
-        self.sources.lists.len()
+        self.0.views()
     }
 
-    /// The source views of a view, which its view sets count along.
+    /// The source views of a view, along which its view sets count.
     pub fn sources(&self, view: usize) -> &[u32] {
-        &self.sources.lists[view]
+        self.0.sources(view)
     }
 
-    /// What the host's user should know about the choice of source views, in sentences.
+    /// What the user should know about the choice of source views, in sentences.
     pub fn warnings(&self) -> &[String] {
-        &self.sources.warnings
+        self.0.warnings()
     }
 
-    /// The window of the patches on the scale of a cycle.
-    pub(super) fn window(&self, cycle: usize) -> &Window {
-        &self.windows[self.stepper[cycle].scale_index]
-    }
-
-    /// A view on the scale of a cycle.
-    pub(super) fn scaled(&self, cycle: usize, view: usize) -> &ScaledView {
-        &self.scaled[self.stepper[cycle].scale_index][view]
-    }
-
-    /// Width and height of a view's maps at a cycle.
+    /// Width and height of a view's maps in a cycle.
     ///
     /// # Errors
-    /// A cycle or view there is not.
+    /// A cycle or view that does not exist.
     pub fn size(&self, cycle: usize, view: usize) -> Result<(u32, u32)> {
-        self.check_place(cycle, view)?;
-        let camera = &self.scaled(cycle, view).camera;
+        let at = Place { cycle, view };
+        self.0.check_place(at)?;
+        let camera = &self.0.scaled(at).camera;
         Ok((camera.width, camera.height))
     }
 
-    /// The cycle to take after this one was taken for all views and they were marked; `None` after the last. A scale
-    /// ends early once few enough of the pixels of the given estimates changed ([`Options::stop_share`]).
+    /// The checked estimate of a view on the scale of `cycle`, the next finer one: each pixel gets the plane of its coarse
+    /// pixel. Reads the view alone.
     ///
     /// # Errors
-    /// A cycle there is not; estimates that were not marked in it.
-    pub fn next(&self, cycle: usize, estimates: &[Option<&ViewEstimate>]) -> Result<Option<usize>> {
-        self.check_states(cycle, 0, estimates)?;
-        let (mut changed, mut pixels) = (0, 0);
-        for (view, estimate) in estimates.iter().enumerate() {
-            let Some(estimate) = estimate else { continue };
-            estimate.require_marked(&format!("estimates[{view}]"), true)?;
-            let record = estimate.cycles().last();
-            changed += record.map_or(0, |record| record.changed);
-            pixels += record.map_or(0, |record| record.pixels);
+    /// A cycle that does not exist; an estimate that is not of the scale before that of `cycle`, or of another scene.
+    pub fn upsample(&self, cycle: usize, estimate: &ViewEstimate<Checked>) -> Result<ViewEstimate<Checked>> {
+        let at = Place { cycle, view: estimate.view() };
+        self.0.check_place(at)?;
+        let scale = |cycle: usize| self.cycles().get(cycle).map(|cycle| cycle.scale_index);
+        let is_coarser = scale(estimate.cycle()).map(|scale| scale + 1) == scale(cycle);
+        if !is_coarser {
+            let value = format!("one of cycle {}", estimate.cycle());
+            let expected = format!("one of the scale before that of cycle {cycle}");
+            return Err(Error::argument("estimate", value, expected));
         }
-        let settled = (changed as f64 / pixels.max(1) as f64) < self.options.schedule.min_changed_fraction;
-        let is_next = |&other: &usize| {
-            let ends = self.stepper[cycle].cycle > 0 && settled;
-            !(ends && self.stepper[other].scale_index == self.stepper[cycle].scale_index)
-        };
-        Ok((cycle + 1..self.stepper.len()).find(is_next))
+        self.check_size(estimate.cycle(), estimate, "estimate")?;
+        Ok(stages::upsampled(&self.0, at, estimate))
     }
 
-    pub(super) fn check_place(&self, cycle: usize, view: usize) -> Result<()> {
-        if cycle >= self.stepper.len() {
-            let expected = format!("a cycle below their number, {}", self.stepper.len());
-            return Err(Error::argument("cycle", cycle, expected));
-        }
-        if view >= self.views() {
-            let expected = format!("a view below their number, {}", self.views());
-            return Err(Error::argument("view", view, expected));
-        }
-        Ok(())
+    /// The candidates for the pixels of a view that have no validated plane: the consistent planes of other views. None in a
+    /// scale's first cycle. Reads the checked planes of the view itself and of the views that have it among their sources, on
+    /// the scale of the cycle.
+    ///
+    /// # Errors
+    /// A cycle or view that does not exist; estimates of another scale, scene or view than their place says.
+    pub fn propagate(&self, cycle: usize, view: usize, estimates: Known<Checked>) -> Result<Candidates> {
+        let at = Place { cycle, view };
+        self.check_estimates(at, estimates)?;
+        let known = |view: usize| estimates.get(view).copied().flatten();
+        let donors = self.0.donors(at, |donor| known(donor).map(ViewEstimate::planes));
+        stages::propagate(&self.0, at, known(view), &donors, &|_| Ok(()))
     }
 
-    /// Refuses estimates of other views or scales than they stand for.
-    pub(super) fn check_states(
+    /// Searches the planes of a view and fills its textureless regions. Starts from the view's own checked estimate, where one
+    /// is given, else at random; reads the published surfaces of the view's sources and the candidates.
+    ///
+    /// # Errors
+    /// What [`Stepper::propagate`] refuses; candidates of another view or cycle; [`Error::Cancelled`] when `progress` breaks.
+    pub fn search(
         &self,
         cycle: usize,
         view: usize,
-        estimates: &[Option<&ViewEstimate>],
-    ) -> Result<()> {
-        self.check_place(cycle, view)?;
-        if !estimates.is_empty() && estimates.len() != self.views() {
-            let expected = format!("one entry for each of the {} views, or none at all", self.views());
-            return Err(Error::argument("estimates", format!("{} entries", estimates.len()), expected));
+        estimates: Known<Checked>,
+        candidates: Option<&Candidates>,
+        progress: ProgressFn,
+    ) -> Result<ViewEstimate<Searched>> {
+        let at = Place { cycle, view };
+        self.check_estimates(at, estimates)?;
+        let pixels = self.0.scaled(at).camera.pixels();
+        if let Some(found) = candidates
+            && (found.at, found.pixels) != (at, pixels)
+        {
+            let value = format!("those of view {} in cycle {}", found.at.view, found.at.cycle);
+            let expected = format!("those of view {view} in cycle {cycle}, of the same stepper");
+            return Err(Error::argument("candidates", value, expected));
         }
-        for (place, estimate) in estimates.iter().enumerate() {
-            let Some(estimate) = estimate else { continue };
-            if estimate.view() != place {
-                let value = format!("the estimate of view {}", estimate.view());
-                return Err(Error::argument(
-                    format!("estimates[{place}]"),
-                    value,
-                    format!("that of view {place}"),
-                ));
+        let tracker = Tracker::with_work(progress, self.cycles()[cycle].work(pixels as u64));
+        let advance = |units| tracker.advance(units, self.0.progress(Phase::Search, at));
+        let known = |view: usize| estimates.get(view).copied().flatten();
+        let own = known(view);
+        let problem = self.0.problem(at, self.surfaces(view, estimates));
+        let is_guided = estimates.iter().any(Option::is_some);
+        let input = SearchInput { own, candidates, is_guided };
+        let found = stages::search(&self.0, at, &problem, input, &advance)?;
+        let searched = stages::fill_textureless(&self.0, &problem, found);
+        Ok(stages::record_search(&self.0, own, searched))
+    }
+
+    /// Checks the planes of a view against those of its sources, then corrects foreground fattening (where the scale may end
+    /// with this cycle), smooths the validated planes and publishes them: depths, normals and verdicts differ from those of
+    /// the searched estimate. Reads the searched planes of the view's sources in the same cycle, or maps of the host's own
+    /// for them; a source that is not known counts neither for nor against a plane.
+    ///
+    /// # Errors
+    /// An estimate or a source of another scale, scene or view than its place says.
+    pub fn check(
+        &self,
+        own: &ViewEstimate<Searched>,
+        sources: &[Option<EstimateRef>],
+    ) -> Result<ViewEstimate<Checked>> {
+        self.0.check_place(own.at)?;
+        self.check_size(own.cycle(), own, "own")?;
+        self.check_count(sources.len())?;
+        for (view, source) in sources.iter().enumerate() {
+            let name = format!("estimates[{view}]");
+            match source {
+                Some(EstimateRef::Searched(found)) => self.check_estimate(own.cycle(), view, found, &name)?,
+                Some(EstimateRef::Checked(found)) => self.check_estimate(own.cycle(), view, found, &name)?,
+                None => (),
             }
-            self.check_scale(cycle, estimate, &format!("estimates[{place}]"))?;
+        }
+        let planes = |view: usize| sources.get(view).copied().flatten().map(EstimateRef::planes);
+        let planes = SourcePlanes::new(self.sources(own.view()), planes);
+        let verdicts = stages::check(&self.0, own, planes, &|_| Ok(()))?;
+        let mut checked = stages::apply_check(own.clone(), &verdicts);
+        stages::correct_fattening(&self.0, &mut checked);
+        stages::smooth_planes(&self.0, &mut checked);
+        Ok(stages::publish(&self.0, checked))
+    }
+
+    /// The cycle to do after this one was done for all views; `None` after the last. A scale ends early once few enough of
+    /// the pixels of the given estimates changed (option `schedule.min_changed_fraction`).
+    ///
+    /// # Errors
+    /// A cycle that does not exist; estimates of another scale.
+    pub fn next(&self, cycle: usize, estimates: Known<Checked>) -> Result<Option<usize>> {
+        self.check_estimates(Place { cycle, view: 0 }, estimates)?;
+        Ok(self.0.next_cycle(cycle, estimates.iter().copied().flatten()))
+    }
+
+    /// The result of a view after the last cycle: averages validated planes across views, fills small gaps where the sources
+    /// confirm them, and determines view set, confidence and status of every pixel. Reads the published surfaces of the
+    /// view's sources, and their checked planes.
+    ///
+    /// # Errors
+    /// A view that does not exist; estimates that are not of full size, or of another scene or view than their place says; no
+    /// estimate of the view itself; [`Error::Cancelled`] when `progress` breaks.
+    pub fn finish(&self, view: usize, estimates: Known<Checked>, progress: ProgressFn) -> Result<ViewResult> {
+        let at = Place { cycle: self.cycles().len() - 1, view };
+        self.check_estimates(at, estimates)?;
+        let Some(own) = estimates.get(view).copied().flatten() else {
+            let name = format!("estimates[{view}]");
+            return Err(Error::argument(name, "none", "the estimate of the view itself"));
+        };
+        let tracker = Tracker::with_work(progress, 1);
+        let advance = |units| tracker.advance(units, self.0.progress(Phase::Check, at));
+        let problem = self.0.problem(at, self.surfaces(view, estimates));
+        let mut planes = stages::average_across_views(&self.0, &problem, own);
+        let filled = stages::fill_gaps(&self.0, at, &planes);
+        let known = |view: usize| estimates.get(view).copied().flatten().map(ViewEstimate::planes);
+        let sources = SourcePlanes::new(self.sources(view), known);
+        stages::recheck(&self.0, &problem, filled, sources, &advance)?.write_to(&mut planes);
+        stages::classify(&self.0, &problem, own.clone(), planes, &advance)
+    }
+
+    pub(super) fn context(&self) -> &RunContext {
+        &self.0
+    }
+
+    fn surfaces<'e>(&self, view: usize, estimates: Known<'e, Checked>) -> PublishedSurfaces<'e> {
+        let surface =
+            |source: usize| estimates.get(source).copied().flatten().map_or(&[][..], ViewEstimate::surface);
+        PublishedSurfaces::new(self.sources(view), surface)
+    }
+
+    /// Refuses estimates of other views or scales than their places say.
+    fn check_estimates<S>(&self, at: Place, estimates: Known<S>) -> Result<()> {
+        self.0.check_place(at)?;
+        self.check_count(estimates.len())?;
+        for (view, estimate) in estimates.iter().enumerate() {
+            let Some(estimate) = estimate else { continue };
+            self.check_estimate(at.cycle, view, estimate, &format!("estimates[{view}]"))?;
         }
         Ok(())
     }
 
-    fn check_scale(&self, cycle: usize, estimate: &ViewEstimate, name: &str) -> Result<()> {
-        let (width, height) = self.size(cycle, estimate.view())?;
-        let same_scale = self.stepper.get(estimate.cycle()).map(|cycle| cycle.scale_index)
-            == Some(self.stepper[cycle].scale_index);
-        if same_scale && estimate.fits(width, height, self.sources(estimate.view()).len()) {
+    fn check_count(&self, count: usize) -> Result<()> {
+        if count == 0 || count == self.views() {
             return Ok(());
         }
-        let value = format!("a estimate after cycle {} of {} pixels", estimate.cycle(), estimate.pixels());
+        let expected = format!("one entry for each of the {} views, or none at all", self.views());
+        Err(Error::argument("estimates", format!("{count} entries"), expected))
+    }
+
+    fn check_estimate<S>(
+        &self,
+        cycle: usize,
+        view: usize,
+        found: &ViewEstimate<S>,
+        name: &str,
+    ) -> Result<()> {
+        if found.view() != view {
+            let (value, expected) =
+                (format!("that of view {}", found.view()), format!("that of view {view}"));
+            return Err(Error::argument(name, value, expected));
+        }
+        self.check_size(cycle, found, name)
+    }
+
+    /// Refuses an estimate that is not of the scale of a cycle.
+    fn check_size<S>(&self, cycle: usize, found: &ViewEstimate<S>, name: &str) -> Result<()> {
+        let (width, height) = self.size(cycle, found.view())?;
+        let scale = |cycle: usize| self.cycles().get(cycle).map(|cycle| cycle.scale_index);
+        let has_scale = scale(found.cycle()) == scale(cycle);
+        if has_scale && found.pixels() == width as usize * height as usize {
+            return Ok(());
+        }
+        let value = format!("one of cycle {} with {} pixels", found.cycle(), found.pixels());
         let expected = format!(
             "one on the scale of cycle {cycle}, {width}x{height} pixels, of the same scene and options; estimates of the \
-             next coarser scale are handed up first"
+             next coarser scale are upsampled first"
         );
         Err(Error::argument(name, value, expected))
     }
-
-    /// Whether a estimate has to be handed up before it can take part in a cycle.
-    pub(super) fn is_coarser(&self, estimate: &ViewEstimate, cycle: usize) -> bool {
-        self.stepper[estimate.cycle()].scale_index < self.stepper[cycle].scale_index
-    }
-
-    /// A estimate on the next finer scale: each pixel gets the plane of its coarse pixel.
-    ///
-    /// # Errors
-    /// A cycle or view there is not; a estimate of another view, or not of the scale before that of `cycle`.
-    pub fn upsample(&self, cycle: usize, view: usize, estimate: &ViewEstimate) -> Result<ViewEstimate> {
-        self.check_place(cycle, view)?;
-        let scale = self.stepper[cycle].scale_index;
-        let own = self.stepper.get(estimate.cycle()).map(|cycle| cycle.scale_index);
-        let coarser = scale.checked_sub(1).filter(|coarser| own == Some(*coarser));
-        let Some(coarser) = coarser else {
-            let value = format!("a estimate after cycle {}", estimate.cycle());
-            return Err(Error::argument(
-                "estimate",
-                value,
-                format!("one on the scale before that of cycle {cycle}"),
-            ));
-        };
-        let coarse_step = self.stepper.iter().position(|cycle| cycle.scale_index == coarser).unwrap_or(0);
-        self.check_scale(coarse_step, estimate, "estimate")?;
-        if estimate.view() != view {
-            let value = format!("the estimate of view {}", estimate.view());
-            return Err(Error::argument("estimate", value, format!("that of view {view}")));
-        }
-        estimate.require_marked("estimate", true)?;
-        let fine = self.scaled(cycle, view);
-        let upsampled = estimate.solved.refined(&self.scaled[coarser][view].camera, &fine.camera, fine.range);
-        Ok(estimate.on_finer_scale(cycle, upsampled))
-    }
-}
-
-/// The window of a scale. At full size a coarser scale has found the surfaces: a smaller window keeps to one of them at
-/// edges.
-fn window(options: &Options, scale: usize) -> Window {
-    let is_finest = scale > 0
-        && options.schedule.scales[scale].downscale == 1
-        && options.window.full_size_window_radius > 0;
-    let (radius, is_round) = match is_finest {
-        true => (options.window.full_size_window_radius, false),
-        false => (options.window.window_radius, options.window.circular_window),
-    };
-    let make = if is_round { Window::disc } else { Window::new };
-    make(
-        radius,
-        options.window.window_step,
-        options.window.sigma_spatial,
-        options.window.sigma_color,
-        options.window.min_variance,
-    )
 }

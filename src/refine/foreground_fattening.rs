@@ -1,188 +1,181 @@
-//! Edges of surfaces, beyond the paper: a window at the edge of a near surface matches by that surface's texture even
-//! where its center already lies on what is behind, so that near surfaces come out too wide. The gray values tell which
-//! of the two a pixel belongs to.
+//! Correction of foreground fattening: a window at the edge of a near surface matches by the texture of that
+//! surface even where its center is already on the background, so that near surfaces come out too wide. The
+//! gray value of a pixel decides which of the two surfaces it is on.
+//!
+//! Around each validated pixel, bilateral weights are summed over the neighbors on the pixel's own surface
+//! (their planes have the same inverse depth there, within `SAME_SURFACE`), on surfaces behind it (smaller by
+//! `BEHIND` at least), and over those without a validated plane. Where the background has the larger sum, the
+//! pixel gets the weighted mean of the background's inverse depths and normals. In the last cycle, a pixel
+//! among many without a plane loses its validation.
+//!
+//! Reads the validated planes and the gray values; changes depth, normal and `validated` of validated planes.
+//! A pass visits 12 neighbors of every pixel, whole rows at a time, and all 120 neighbors of the pixels near
+//! a depth edge; later passes visit only what is near a change of the pass before.
+//!
+//! Sources: the effect is described by Scharstein and Szeliski, "A taxonomy and evaluation of dense two-frame
+//! stereo correspondence algorithms" (2002); the weights are those of a bilateral filter (Tomasi and
+//! Manduchi, 1998).
 
-use crate::geometry::Camera;
-use crate::geometry::DepthRange;
-use crate::geometry::MIN_FACING;
-use crate::geometry::SlantedPlane;
-use crate::image::PackedImage;
-use crate::refine::stencil::Padded;
-use crate::scene::{PixelEstimate, surface};
-use glam::{DVec2, Vec3};
+use super::stencil::{BilateralStencil, Border, GrayWeights, PaddedMap, Stencil};
+use super::{Domain, Filter, FilteredView, marked_pixels};
+use crate::geometry::{Grid, Offset, PlaneHypothesis, Position, SlantedPlane};
+use crate::scene::{PixelEstimate, validated_planes};
+use glam::Vec3;
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
 
-/// Half side of the neighborhood, in pixels: more than that surfaces are hardly widened.
+/// Radius of the neighborhood in pixels: surfaces are hardly ever fattened by more.
 const RADIUS: i32 = 6;
-/// Difference of gray values at which a neighbor counts for 1 / sqrt(e).
-const GRAY_SIGMA: f32 = 6.0;
-/// Distance in pixels at which it counts for 1 / sqrt(e).
+/// Distance in pixels with weight 1 / sqrt(e), 2 / 3 of the radius.
 const SPATIAL_SIGMA: f32 = 4.0;
-/// Relative difference of inverse depths up to which a neighbor lies on the pixel's surface, and from which on it lies
-/// on one behind.
-const SAME: f32 = 0.01;
+/// Difference of gray values (0 to 255) with weight 1 / sqrt(e): a few deviations of a photograph's noise.
+const GRAY_SIGMA: f32 = 6.0;
+/// Relative difference of inverse depths below which a neighbor is on the pixel's surface; equal to the
+/// largest error of depth that the default check tolerates.
+const SAME_SURFACE: f32 = 0.01;
+/// Relative decrease of inverse depth from which a neighbor is on a surface behind: twice `SAME_SURFACE`, so
+/// that rounded edges are neither.
 const BEHIND: f32 = 0.02;
-/// Empty pixels must outweigh the pixel's surface by this factor: they may be gaps in it.
+/// Factor by which the weight of neighbors without a plane must exceed that of the pixel's surface to end its
+/// validation: they may also be gaps in the surface.
 const EMPTY_FACTOR: f32 = 2.0;
-
-/// Neighbors that show whether there is an edge nearby.
-const PROBES: [(i32, i32); 12] =
+/// Offsets of the neighbors that reveal a depth edge nearby, at half of the radius and at the radius: a
+/// background that outweighs the pixel's surface is wide enough to cover one of them.
+const PROBES: [Offset; 12] =
     [(3, 0), (-3, 0), (0, 3), (0, -3), (6, 0), (-6, 0), (0, 6), (0, -6), (4, 4), (-4, 4), (4, -4), (-4, -4)];
 
-/// The neighborhood, and how much neighbors count.
-struct Weights {
-    neighbors: Vec<Neighbor>,
-    by_gray: [f32; 256],
+/// Moves validated pixels at depth edges to the surface behind if their gray values are closer to its.
+pub struct CorrectFattening {
+    /// How many times the edges are moved, each time by a few pixels at most.
+    pub passes: u32,
+    /// Whether no search follows: then pixels without a plane count as background, and validated pixels among
+    /// them lose their validation. Before that, a search may still find planes there.
+    pub is_last_cycle: bool,
 }
 
-/// A place in the neighborhood.
-struct Neighbor {
-    offset: (i32, i32),
-    weight: f32,
+/// The surface that a validated pixel is assigned to.
+enum Assignment {
+    /// The one it has.
+    Own,
+    /// The one behind.
+    Background(PlaneHypothesis),
+    /// None: the neighborhood is mostly empty.
+    Nothing,
 }
 
-impl Weights {
-    fn new() -> Weights {
-        let gaussian = |value: f32, sigma: f32| (-value * value / (2.0 * sigma * sigma)).exp();
-        let offsets = (-RADIUS..=RADIUS).flat_map(|dy| (-RADIUS..=RADIUS).map(move |dx| (dx, dy)));
-        let near = |&(dx, dy): &(i32, i32)| dx * dx + dy * dy <= RADIUS * RADIUS + 1 && (dx, dy) != (0, 0);
-        let weigh = |(dx, dy): (i32, i32)| Neighbor {
-            offset: (dx, dy),
-            weight: gaussian(((dx * dx + dy * dy) as f32).sqrt(), SPATIAL_SIGMA),
+impl Filter for CorrectFattening {
+    fn reach(&self) -> Option<usize> {
+        Some(self.passes as usize * RADIUS as usize)
+    }
+
+    fn domain(&self) -> Domain {
+        Domain::Validated
+    }
+
+    fn apply(&self, view: &FilteredView, planes: &mut [PixelEstimate]) -> Vec<u32> {
+        let stencil = BilateralStencil {
+            spatial: Stencil::disc(RADIUS, SPATIAL_SIGMA),
+            gray: GrayWeights::new(GRAY_SIGMA, 0.0),
         };
-        Weights {
-            neighbors: offsets.filter(near).map(weigh).collect(),
-            by_gray: std::array::from_fn(|difference| gaussian(difference as f32, GRAY_SIGMA)),
+        let (grid, is_last_cycle) = (view.grid(), self.is_last_cycle);
+        let mut is_replaced = vec![false; planes.len()];
+        let mut changes = ChangedBlocks::all(grid);
+        for _ in 0..self.passes {
+            let before = planes.to_vec();
+            let surfaces = validated_planes(view.camera, &before);
+            let edges = EdgeDetector::new(grid, &surfaces, is_last_cycle);
+            let classifier = Classifier { view, stencil: &stencil, before: &before, surfaces, is_last_cycle };
+            let rows = planes.par_chunks_mut(grid.width).zip(is_replaced.par_chunks_mut(grid.width));
+            rows.enumerate().for_each(|(y, (row, is_replaced))| {
+                if changes.is_near_row(y) {
+                    let is_near_edge = edges.detect_in_row(y, grid.width);
+                    for (x, estimate) in row.iter_mut().enumerate() {
+                        // Where nothing changed in the pass before, nothing changes in this one.
+                        if is_near_edge[x] && estimate.validated && changes.is_near((x, y)) {
+                            is_replaced[x] |= classifier.reassign(estimate, (x, y));
+                        }
+                    }
+                }
+            });
+            changes = ChangedBlocks::between(grid, &before, planes);
         }
+        marked_pixels(&is_replaced)
     }
 }
 
-/// What becomes of a validated pixel.
-enum Belongs {
-    /// To its own surface.
-    ToItsOwn,
-    /// To the one behind.
-    Behind { depth: f32, normal: Vec3 },
-    /// To none that is known.
-    Nowhere,
-}
-
-/// Gives the validated pixels that look more like a surface behind to that one, in so many passes, each of which moves
-/// edges by a few pixels at most. Pixels in the midst of empty ones are given up where no search follows.
-pub fn trim(
-    camera: &Camera,
-    image: &PackedImage,
-    range: DepthRange,
-    solutions: &mut [PixelEstimate],
-    passes: u32,
-    is_last: bool,
-) {
-    let weights = Weights::new();
-    let mut moved = Moved::everywhere(image.width, image.height);
-    for _ in 0..passes {
-        let planes = surface(camera, solutions);
-        let near_edges = NearEdges::new((image.width, image.height), &planes, is_last);
-        let edges =
-            Edges { camera, image, range, planes: &planes, before: solutions, weights: &weights, is_last };
-        let width = image.width;
-        let mut trimmed = solutions.to_vec();
-        trimmed.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
-            // Where nothing moved in the pass before, nothing moves in this one.
-            if !moved.is_near_row(y) {
-                return;
-            }
-            let near_edges = near_edges.of_row(y, width);
-            for (x, solution) in row.iter_mut().enumerate() {
-                if !near_edges[x] || !solution.validated || !moved.is_near(x, y) {
-                    continue;
-                }
-                match edges.judge((x, y)) {
-                    Belongs::ToItsOwn => {}
-                    Belongs::Behind { depth, normal } => (solution.depth, solution.normal) = (depth, normal),
-                    Belongs::Nowhere => solution.validated = false,
-                }
-            }
-        });
-        moved = Moved::between(solutions, &trimmed, width);
-        solutions.copy_from_slice(&trimmed);
-    }
-}
-
-/// The blocks of the image in which a pass moved an edge.
-struct Moved {
-    blocks: Vec<bool>,
+/// The blocks of the image in which a pass changed an estimate.
+struct ChangedBlocks {
+    is_changed: Vec<bool>,
     columns: usize,
 }
 
-impl Moved {
-    /// Side of a block, in pixels: more than the neighborhood's half side.
-    const BLOCK: usize = 8;
+impl ChangedBlocks {
+    /// Side of a block in pixels: not less than the radius, so that a neighborhood touches at most 3 x 3
+    /// blocks.
+    const SIDE: usize = 8;
 
-    fn everywhere(width: usize, height: usize) -> Moved {
-        let columns = width.div_ceil(Moved::BLOCK);
-        Moved { blocks: vec![true; columns * height.div_ceil(Moved::BLOCK)], columns }
+    fn all(grid: Grid) -> ChangedBlocks {
+        let [columns, rows] = [grid.width, grid.height].map(|side| side.div_ceil(ChangedBlocks::SIDE));
+        ChangedBlocks { is_changed: vec![true; columns * rows], columns }
     }
 
-    fn between(before: &[PixelEstimate], after: &[PixelEstimate], width: usize) -> Moved {
-        let mut moved = Moved::everywhere(width, before.len().div_ceil(width.max(1)));
-        moved.blocks.fill(false);
+    fn between(grid: Grid, before: &[PixelEstimate], after: &[PixelEstimate]) -> ChangedBlocks {
+        let mut blocks = ChangedBlocks::all(grid);
+        blocks.is_changed.fill(false);
         for pixel in (0..before.len()).filter(|&pixel| before[pixel] != after[pixel]) {
-            let (column, row) = (pixel % width / Moved::BLOCK, pixel / width / Moved::BLOCK);
-            moved.blocks[row * moved.columns + column] = true;
+            let (x, y) = grid.position(pixel);
+            blocks.is_changed[y / ChangedBlocks::SIDE * blocks.columns + x / ChangedBlocks::SIDE] = true;
         }
-        moved
+        blocks
     }
 
-    /// Whether anything in the neighborhood of a pixel moved.
-    fn is_near(&self, x: usize, y: usize) -> bool {
-        let columns = Moved::span(x, self.columns);
+    /// Whether a block within the radius of a pixel changed.
+    fn is_near(&self, (x, y): Position) -> bool {
+        let columns = ChangedBlocks::within_radius(x, self.columns);
         self.rows_near(y).any(|row| row[columns.clone()].contains(&true))
     }
 
-    /// Whether anything in the neighborhood of a row moved.
+    /// Whether a block within the radius of a row changed.
     fn is_near_row(&self, y: usize) -> bool {
         self.rows_near(y).any(|row| row.contains(&true))
     }
 
     fn rows_near(&self, y: usize) -> impl Iterator<Item = &[bool]> {
-        let rows = Moved::span(y, self.blocks.len() / self.columns);
-        self.blocks.chunks_exact(self.columns).take(rows.end() + 1).skip(*rows.start())
+        let rows = ChangedBlocks::within_radius(y, self.is_changed.len() / self.columns);
+        self.is_changed.chunks_exact(self.columns).take(rows.end() + 1).skip(*rows.start())
     }
 
-    /// The blocks the neighborhood reaches along one axis.
-    fn span(at: usize, count: usize) -> RangeInclusive<usize> {
-        let last = (at + RADIUS as usize) / Moved::BLOCK;
-        at.saturating_sub(RADIUS as usize) / Moved::BLOCK..=last.min(count - 1)
+    /// The blocks within the radius of a coordinate, out of `count`.
+    fn within_radius(coordinate: usize, count: usize) -> RangeInclusive<usize> {
+        let last = (coordinate + RADIUS as usize) / ChangedBlocks::SIDE;
+        coordinate.saturating_sub(RADIUS as usize) / ChangedBlocks::SIDE..=last.min(count - 1)
     }
 }
 
-/// Tells, row by row, which pixels have an edge nearby: the others are their surface's own.
-struct NearEdges {
-    /// Of the validated planes; not a number where nothing is compared.
-    inverse_depth: Padded,
-    slope_x: Padded,
-    slope_y: Padded,
+/// Finds the pixels near a depth edge, row by row; all others keep their surface.
+struct EdgeDetector {
+    /// Of the validated planes; NaN, which compares false, where there is nothing to compare with.
+    inverse_depth: PaddedMap,
+    slope_x: PaddedMap,
+    slope_y: PaddedMap,
 }
 
-impl NearEdges {
-    /// Empty pixels lie behind all others where no search follows, and say nothing where one does.
-    fn new(size: (usize, usize), planes: &[SlantedPlane], is_last: bool) -> NearEdges {
-        let empty = if is_last { 0.0 } else { f32::NAN };
-        let padded = |beyond, value: &(dyn Fn(&SlantedPlane) -> f32 + Sync)| {
-            Padded::new(size, (RADIUS as usize, beyond), |pixel| value(&planes[pixel]))
+impl EdgeDetector {
+    fn new(grid: Grid, planes: &[SlantedPlane], is_last_cycle: bool) -> EdgeDetector {
+        // Infinitely far behind all others.
+        let empty = if is_last_cycle { 0.0 } else { f32::NAN };
+        let padded = |value, of: &(dyn Fn(&SlantedPlane) -> f32 + Sync)| {
+            PaddedMap::new(grid, Border { width: RADIUS as usize, value }, |pixel| of(&planes[pixel]))
         };
-        NearEdges {
-            inverse_depth: padded(f32::NAN, &|plane| match plane.inverse_depth {
-                inverse_depth if inverse_depth > 0.0 => inverse_depth,
-                _ => empty,
-            }),
+        let or_empty = |inverse_depth: f32| if inverse_depth > 0.0 { inverse_depth } else { empty };
+        EdgeDetector {
+            inverse_depth: padded(f32::NAN, &|plane| or_empty(plane.inverse_depth)),
             slope_x: padded(0.0, &|plane| plane.slope_x),
             slope_y: padded(0.0, &|plane| plane.slope_y),
         }
     }
 
-    fn of_row(&self, y: usize, width: usize) -> Vec<bool> {
+    fn detect_in_row(&self, y: usize, width: usize) -> Vec<bool> {
         let own = self.inverse_depth.row(y, (0, 0), width);
         let mut is_near = vec![false; width];
         for (dx, dy) in PROBES {
@@ -191,84 +184,92 @@ impl NearEdges {
             let slope_y = self.slope_y.row(y, (dx, dy), width);
             let (dx, dy) = (dx as f32, dy as f32);
             for x in 0..width {
-                let there = inverse_depth[x] - slope_x[x] * dx - slope_y[x] * dy;
-                is_near[x] |= there < own[x] * (1.0 - BEHIND);
+                let predicted = inverse_depth[x] - slope_x[x] * dx - slope_y[x] * dy;
+                is_near[x] |= predicted < own[x] * (1.0 - BEHIND);
             }
         }
         is_near
     }
 }
 
-struct Edges<'a> {
-    camera: &'a Camera,
-    image: &'a PackedImage,
-    range: DepthRange,
-    planes: &'a [SlantedPlane],
+/// Assigns pixels to surfaces by the estimates before the pass.
+struct Classifier<'a> {
+    view: &'a FilteredView<'a>,
+    stencil: &'a BilateralStencil,
     before: &'a [PixelEstimate],
-    weights: &'a Weights,
-    /// Whether no search follows.
-    is_last: bool,
+    /// Its validated planes, inverse depth 0 elsewhere.
+    surfaces: Vec<SlantedPlane>,
+    is_last_cycle: bool,
 }
 
-impl Edges<'_> {
-    /// Column and row of the pixel at an offset, `None` outside the image.
-    fn neighbor(&self, (x, y): (usize, usize), (dx, dy): (i32, i32)) -> Option<(usize, usize)> {
-        let (column, row) = (x.wrapping_add_signed(dx as isize), y.wrapping_add_signed(dy as isize));
-        (column < self.image.width && row < self.image.height).then_some((column, row))
+impl Classifier<'_> {
+    /// Changes an estimate to its assignment; returns whether that is another one.
+    fn reassign(&self, estimate: &mut PixelEstimate, position: Position) -> bool {
+        match self.classify(position) {
+            Assignment::Own => return false,
+            Assignment::Background(plane) => {
+                (estimate.depth, estimate.normal) = (plane.depth, plane.normal);
+            }
+            Assignment::Nothing => estimate.validated = false,
+        }
+        true
     }
 
-    /// Relative difference to a pixel's inverse depth of what the plane of its neighbor at an offset has there; `None`
-    /// without one.
-    fn difference(&self, own: f32, (x, y): (usize, usize), (dx, dy): (i32, i32)) -> Option<f32> {
-        let plane = &self.planes[y * self.image.width + x];
-        let there = plane.inverse_depth_at(-dx as f32, -dy as f32);
-        (plane.inverse_depth > 0.0).then_some(there / own - 1.0)
-    }
-
-    fn judge(&self, at: (usize, usize)) -> Belongs {
-        let pixel = at.1 * self.image.width + at.0;
-        let own = self.planes[pixel].inverse_depth;
-        let gray = self.image.gray(at.0, at.1);
+    fn classify(&self, position: Position) -> Assignment {
+        let own = self.surfaces[self.view.grid().index(position)].inverse_depth;
+        // The pixel itself has weight 1.
         let (mut same, mut behind, mut empty) = (1.0, 0.0, 0.0);
         let (mut inverse_depth, mut normal) = (0.0, Vec3::ZERO);
-        for &Neighbor { offset, weight } in &self.weights.neighbors {
-            let Some(other) = self.neighbor(at, offset) else { continue };
-            let difference_of_grays = gray.abs_diff(self.image.gray(other.0, other.1));
-            let weight = weight * self.weights.by_gray[usize::from(difference_of_grays)];
-            match self.difference(own, other, offset) {
+        for neighbor in self.stencil.neighbors(self.view.image, position) {
+            let weight = neighbor.weight;
+            match self.relative_difference(own, neighbor.pixel, neighbor.offset) {
                 None => empty += weight,
-                Some(difference) if difference.abs() < SAME => same += weight,
+                Some(difference) if difference.abs() < SAME_SURFACE => same += weight,
                 Some(difference) if difference < -BEHIND => {
                     behind += weight;
                     inverse_depth += weight * own * (1.0 + difference);
-                    normal += weight * self.before[other.1 * self.image.width + other.0].normal;
+                    normal += weight * self.before[neighbor.pixel].normal;
                 }
                 Some(_) => {}
             }
         }
         if behind > same {
-            let (depth, normal) = (behind / inverse_depth, normal.normalize_or_zero());
-            let ray = self.camera.ray(DVec2::new(at.0 as f64, at.1 as f64)).as_vec3();
-            let in_range = depth >= self.range.near as f32 && depth <= self.range.far as f32;
-            if in_range && normal.dot(ray) < -MIN_FACING {
-                return Belongs::Behind { depth, normal };
+            let plane = PlaneHypothesis { depth: behind / inverse_depth, normal: normal.normalize_or_zero() };
+            if self.view.is_usable(plane, position) {
+                return Assignment::Background(plane);
             }
         }
-        if self.is_last && empty > EMPTY_FACTOR * same { Belongs::Nowhere } else { Belongs::ToItsOwn }
+        if self.is_last_cycle && empty > EMPTY_FACTOR * same { Assignment::Nothing } else { Assignment::Own }
+    }
+
+    /// Relative difference from a pixel's inverse depth to that of the plane of its neighbor at an offset,
+    /// `None` if the neighbor has no validated plane.
+    fn relative_difference(&self, own: f32, neighbor: usize, (dx, dy): Offset) -> Option<f32> {
+        let plane = &self.surfaces[neighbor];
+        let predicted = plane.inverse_depth_at(-dx as f32, -dy as f32);
+        (plane.inverse_depth > 0.0).then_some(predicted / own - 1.0)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::contract::assert_contract;
     use super::*;
-    use crate::geometry::Camera;
-    use crate::image::Picture;
-    use glam::DMat3;
+    use crate::geometry::{Camera, DepthRange};
+    use crate::image::{PackedImage, Picture};
+    use glam::{DMat3, DVec3};
 
     const SIZE: (u32, u32) = (48, 32);
+    const GRID: Grid = Grid { width: SIZE.0 as usize, height: SIZE.1 as usize };
     const RANGE: DepthRange = DepthRange { near: 1.0, far: 20.0 };
-    /// Columns the near surface really covers.
+    /// Columns that the near surface really covers.
     const TRUE_EDGE: usize = 20;
+
+    #[test]
+    fn keeps_the_contract() {
+        assert_contract(|_, _| Box::new(CorrectFattening { passes: 1, is_last_cycle: false }));
+        assert_contract(|_, _| Box::new(CorrectFattening { passes: 3, is_last_cycle: true }));
+    }
 
     fn camera() -> Camera {
         let (width, height) = SIZE;
@@ -280,82 +281,100 @@ mod tests {
             cx: 23.5,
             cy: 15.5,
             rotation: DMat3::IDENTITY,
-            translation: glam::DVec3::ZERO,
+            translation: DVec3::ZERO,
         }
     }
 
-    /// A dark surface at depth 4 left of the edge, a bright one at depth 8 right of it.
-    fn image() -> PackedImage {
-        let (width, height) = SIZE;
-        let gray = (0..width * height).map(|pixel| if (pixel % width) < TRUE_EDGE as u32 { 60 } else { 160 });
-        PackedImage::new(&Picture::from_gray(width, height, gray.collect()).unwrap())
+    fn image(gray: impl Fn(usize) -> u8) -> PackedImage {
+        let grays = (0..GRID.pixels()).map(gray).collect();
+        PackedImage::new(&Picture::from_gray(SIZE.0, SIZE.1, grays).unwrap())
     }
 
-    /// The near surface comes out some columns too wide.
-    fn solutions(behind: f32, too_wide: usize) -> Vec<PixelEstimate> {
-        let of = |pixel: usize| PixelEstimate {
-            depth: if pixel % SIZE.0 as usize >= TRUE_EDGE + too_wide { behind } else { 4.0 },
+    /// A dark surface left of the edge, a bright one right of it.
+    fn two_surfaces() -> PackedImage {
+        image(|pixel| if GRID.position(pixel).0 < TRUE_EDGE { 60 } else { 160 })
+    }
+
+    fn correct(filter: CorrectFattening, image: &PackedImage, planes: &mut [PixelEstimate]) {
+        filter.apply(&FilteredView { camera: &camera(), image, range: RANGE }, planes);
+    }
+
+    fn first_cycles(passes: u32) -> CorrectFattening {
+        CorrectFattening { passes, is_last_cycle: false }
+    }
+
+    fn last_cycle(passes: u32) -> CorrectFattening {
+        CorrectFattening { passes, is_last_cycle: true }
+    }
+
+    /// A surface at depth 4, some columns too wide, before a background.
+    fn fattened(background: f32, too_wide: usize) -> Vec<PixelEstimate> {
+        let is_near = |pixel| GRID.position(pixel).0 < TRUE_EDGE + too_wide;
+        let estimate = |pixel| PixelEstimate {
+            depth: if is_near(pixel) { 4.0 } else { background },
             normal: Vec3::NEG_Z,
-            consistent: 3,
+            consistent_views: 3,
             validated: true,
             ..PixelEstimate::default()
         };
-        (0..(SIZE.0 * SIZE.1) as usize).map(of).collect()
+        (0..GRID.pixels()).map(estimate).collect()
     }
 
     #[test]
-    fn a_near_surface_that_came_out_too_wide_ends_where_the_gray_values_do() {
-        let mut trimmed = solutions(8.0, 4);
-        trim(&camera(), &image(), RANGE, &mut trimmed, 10, false);
-        for (pixel, solution) in trimmed.iter().enumerate() {
-            let expected = if pixel % SIZE.0 as usize >= TRUE_EDGE { 8.0 } else { 4.0 };
-            assert!((solution.depth - expected).abs() < 1e-3, "{} at {pixel}", solution.depth);
-            assert!(solution.validated);
+    fn a_fattened_surface_ends_where_its_gray_value_does() {
+        let mut planes = fattened(8.0, 4);
+        correct(first_cycles(10), &two_surfaces(), &mut planes);
+        for (pixel, plane) in planes.iter().enumerate() {
+            let expected = if GRID.position(pixel).0 < TRUE_EDGE { 4.0 } else { 8.0 };
+            assert!((plane.depth - expected).abs() < 1e-3, "{} at {pixel}", plane.depth);
+            assert!(plane.validated);
         }
     }
 
     #[test]
-    fn passes_that_only_look_where_something_moved_find_all_that_moves() {
-        let mut at_once = solutions(8.0, 4);
-        trim(&camera(), &image(), RANGE, &mut at_once, 6, true);
-        let mut one_by_one = solutions(8.0, 4);
-        for _ in 0..6 {
-            trim(&camera(), &image(), RANGE, &mut one_by_one, 1, true);
-        }
+    fn several_passes_at_once_equal_as_many_single_ones() {
+        let mut at_once = fattened(8.0, 4);
+        correct(last_cycle(6), &two_surfaces(), &mut at_once);
+        let mut one_by_one = fattened(8.0, 4);
+        (0..6).for_each(|_| correct(last_cycle(1), &two_surfaces(), &mut one_by_one));
         assert_eq!(at_once, one_by_one);
     }
 
     #[test]
-    fn what_looks_alike_stays_and_so_does_a_single_surface() {
-        let (width, height) = SIZE;
-        let gray = vec![100; (width * height) as usize];
-        let plain = PackedImage::new(&Picture::from_gray(width, height, gray).unwrap());
-        let mut same = solutions(8.0, 4);
-        trim(&camera(), &plain, RANGE, &mut same, 1, false);
-        let moved = same.iter().zip(solutions(8.0, 4)).filter(|(after, before)| *after != before).count();
-        // Where nothing tells the surfaces apart the nearer neighbors decide: no more than a column of ties.
-        assert!(moved <= height as usize, "{moved}");
-        let mut single = solutions(4.0, 4);
-        trim(&camera(), &image(), RANGE, &mut single, 4, true);
-        assert_eq!(single, solutions(4.0, 4));
+    fn without_a_difference_of_gray_values_the_edge_moves_by_one_pixel_at_most() {
+        let mut planes = fattened(8.0, 4);
+        correct(first_cycles(1), &image(|_| 100), &mut planes);
+        let moved = planes.iter().zip(fattened(8.0, 4)).filter(|(after, before)| *after != before).count();
+        assert!(moved <= GRID.height, "{moved} pixels moved");
     }
 
     #[test]
-    fn pixels_before_nothing_are_given_up_where_no_search_follows() {
-        for (is_last, kept) in [(false, TRUE_EDGE + 1), (true, TRUE_EDGE)] {
-            let mut before_nothing = solutions(0.0, 1);
-            before_nothing.iter_mut().for_each(|solution| solution.validated = solution.depth > 0.0);
-            trim(&camera(), &image(), RANGE, &mut before_nothing, 4, is_last);
-            let row = &before_nothing[16 * SIZE.0 as usize..][..SIZE.0 as usize];
-            assert_eq!(row.iter().filter(|solution| solution.validated).count(), kept);
+    fn a_single_surface_stays_whatever_its_gray_values() {
+        let mut planes = fattened(4.0, 4);
+        correct(last_cycle(4), &two_surfaces(), &mut planes);
+        assert_eq!(planes, fattened(4.0, 4));
+    }
+
+    #[test]
+    fn pixels_before_an_empty_background_lose_their_validation_in_the_last_cycle_only() {
+        for (filter, kept) in [(first_cycles(4), TRUE_EDGE + 1), (last_cycle(4), TRUE_EDGE)] {
+            let mut planes = fattened(0.0, 1);
+            planes.iter_mut().for_each(|plane| plane.validated = plane.depth > 0.0);
+            correct(filter, &two_surfaces(), &mut planes);
+            let row = &planes[GRID.index((0, 16))..][..GRID.width];
+            assert_eq!(row.iter().filter(|plane| plane.validated).count(), kept);
         }
     }
 
     #[test]
-    fn a_surface_behind_that_leaves_the_depth_range_is_not_given_anything() {
-        let range = DepthRange { near: 1.0, far: 6.0 };
-        let mut trimmed = solutions(8.0, 4);
-        trim(&camera(), &image(), range, &mut trimmed, 4, false);
-        assert_eq!(trimmed, solutions(8.0, 4));
+    fn pixels_stay_where_the_background_is_out_of_the_depth_range() {
+        let view = FilteredView {
+            camera: &camera(),
+            image: &two_surfaces(),
+            range: DepthRange { near: 1.0, far: 6.0 },
+        };
+        let mut planes = fattened(8.0, 4);
+        assert_eq!(first_cycles(4).apply(&view, &mut planes), [0u32; 0]);
+        assert_eq!(planes, fattened(8.0, 4));
     }
 }

@@ -1,89 +1,149 @@
-//! Smoothing, beyond the paper: each validated plane is averaged with the validated planes around it that continue the
-//! same surface. Windows of neighboring pixels share samples but not their errors of search, which average out.
+//! Bilateral smoothing of planes: each validated plane is averaged with the validated planes around it that
+//! continue the same surface. Matching windows of neighboring pixels overlap, but their errors of search are
+//! independent and average out.
+//!
+//! Let a neighbor at `(dx, dy)` have the inverse depth `w'`, slopes `s'` and unit normal `n'`, and the pixel
+//! `w` and `n`. The neighbor's plane has the inverse depth `p = w' - s'.x dx - s'.y dy` at the pixel, and its
+//! weight is
+//!
+//! ```text
+//! exp(-((p - w) / (w DEPTH_SIGMA))^2 / 2 - (1 - n . n') / NORMAL_SCALE
+//!     - (difference of gray values / GRAY_SIGMA)^2 / 2 - (dx^2 + dy^2) / (2 SPATIAL_SIGMA^2))
+//! ```
+//!
+//! with `(1 - e / 8)^8` for `exp(-e)`. The new inverse depth is the weighted mean of `p`, the new normal that
+//! of `n'`. Reads the validated planes and the gray values; changes depth and normal of validated planes.
+//! Each pass visits 12 neighbors of each pixel, whole rows at a time.
+//!
+//! Source: the bilateral filter (Tomasi and Manduchi, 1998), on planes.
 
-use crate::geometry::Camera;
-use crate::geometry::DepthRange;
-use crate::geometry::MIN_FACING;
-use crate::image::PackedImage;
-use crate::refine::stencil::Padded;
-use crate::scene::{PixelEstimate, surface};
-use glam::{DVec2, Vec3};
+use super::stencil::{Border, PaddedMap};
+use super::{Domain, Filter, FilteredView, marked_pixels};
+use crate::geometry::{Offset, PlaneHypothesis};
+use crate::scene::{PixelEstimate, validated_planes};
+use glam::Vec3;
 use rayon::prelude::*;
 
-/// Half side of the neighborhood and distance between the neighbors that are looked at, in pixels.
+/// Radius of the neighborhood in pixels, about 1.5 `SPATIAL_SIGMA`: neighbors farther away weigh less than a
+/// third.
 const RADIUS: usize = 4;
+/// Spacing of the sampled neighbors along x and y, in pixels: windows of adjacent pixels share most of their
+/// samples, so that the neighbors between add work and little information.
 const STEP: usize = 2;
-/// Relative difference of inverse depth at which a neighbor's plane counts for 1 / sqrt(e).
+/// Relative difference of inverse depths with weight 1 / sqrt(e): above the errors of search, below the steps
+/// between surfaces. Chosen on renderings.
 const DEPTH_SIGMA: f32 = 0.004;
-/// `1 - cos` of the angle between normals at which it counts for 1 / e: 30 degrees.
+/// `1 - cos` of the angle between normals with weight 1 / e, 30 degrees: wide, as a window determines its
+/// normal far less precisely than its depth.
 const NORMAL_SCALE: f32 = 0.134;
-/// Difference of gray values at which it counts for 1 / sqrt(e).
+/// Difference of gray values (0 to 255) with weight 1 / sqrt(e): several deviations of a photograph's noise.
 const GRAY_SIGMA: f32 = 10.0;
-/// Distance in pixels at which it counts for 1 / sqrt(e).
+/// Distance in pixels with weight 1 / sqrt(e): errors are independent beyond about that distance, as windows
+/// no longer share most of their samples.
 const SPATIAL_SIGMA: f32 = 2.7;
 
-/// What the neighbors are asked for; planes as inverse depth, 0 where nothing is validated.
-struct Surface {
-    inverse_depth: Padded,
-    slope: [Padded; 2],
-    normal: [Padded; 3],
-    gray: Padded,
+/// Replaces each validated plane by the bilateral mean of the validated planes around it; planes whose mean
+/// is not usable stay.
+pub struct SmoothPlanes {
+    /// How many times the planes are smoothed, each time reading the result of the pass before.
+    pub passes: u32,
 }
 
-/// The weighted sums of a row.
-struct Sums {
-    weight: Vec<f32>,
-    inverse_depth: Vec<f32>,
-    normal: [Vec<f32>; 3],
-}
+impl Filter for SmoothPlanes {
+    fn reach(&self) -> Option<usize> {
+        Some(self.passes as usize * RADIUS)
+    }
 
-/// Smooths the validated solutions of a view; planes that would leave the depth range or turn away stay.
-pub fn smooth(camera: &Camera, image: &PackedImage, range: DepthRange, solutions: &mut [PixelEstimate]) {
-    let (width, height) = (image.width, image.height);
-    let ray = |x: usize, y: usize| camera.ray(DVec2::new(x as f64, y as f64)).as_vec3();
-    let surface = {
-        let planes = surface(camera, solutions);
-        let padded =
-            |value: &(dyn Fn(usize) -> f32 + Sync)| Padded::new((width, height), (RADIUS, 0.0), value);
-        Surface {
-            inverse_depth: padded(&|pixel| planes[pixel].inverse_depth),
-            slope: [padded(&|pixel| planes[pixel].slope_x), padded(&|pixel| planes[pixel].slope_y)],
-            normal: std::array::from_fn(|axis| padded(&|pixel| solutions[pixel].normal[axis])),
-            gray: padded(&|pixel| f32::from(image.gray(pixel % width, pixel / width))),
+    fn domain(&self) -> Domain {
+        Domain::Validated
+    }
+
+    fn apply(&self, view: &FilteredView, planes: &mut [PixelEstimate]) -> Vec<u32> {
+        let mut is_replaced = vec![false; planes.len()];
+        for _ in 0..self.passes {
+            smooth_once(view, planes, &mut is_replaced);
         }
-    };
-    solutions.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
-        let sums = surface.sum_row(y, width);
-        for (x, solution) in row.iter_mut().enumerate().filter(|(_, solution)| solution.validated) {
-            let depth = sums.weight[x] / sums.inverse_depth[x];
-            let normal = Vec3::from_array(std::array::from_fn(|axis| sums.normal[axis][x]));
-            let normal = normal.normalize_or_zero();
-            let in_range = depth >= range.near as f32 && depth <= range.far as f32;
-            if in_range && normal.dot(ray(x, y)) < -MIN_FACING {
-                (solution.depth, solution.normal) = (depth, normal);
+        marked_pixels(&is_replaced)
+    }
+}
+
+fn smooth_once(view: &FilteredView, planes: &mut [PixelEstimate], is_replaced: &mut [bool]) {
+    let width = view.image.width;
+    let maps = PlaneMaps::new(view, planes);
+    let rows = planes.par_chunks_mut(width).zip(is_replaced.par_chunks_mut(width));
+    rows.enumerate().for_each(|(y, (row, is_replaced))| {
+        let sums = maps.sum_row(y, width);
+        for (x, estimate) in row.iter_mut().enumerate().filter(|(_, estimate)| estimate.validated) {
+            let mean = sums.mean(x);
+            if view.is_usable(mean, (x, y)) {
+                (estimate.depth, estimate.normal) = (mean.depth, mean.normal);
+                is_replaced[x] = true;
             }
         }
     });
 }
 
-impl Surface {
-    fn sum_row(&self, y: usize, width: usize) -> Sums {
+/// The input of a pass by component.
+struct PlaneMaps {
+    /// 0 where there is no validated plane.
+    inverse_depth: PaddedMap,
+    slope: [PaddedMap; 2],
+    normal: [PaddedMap; 3],
+    gray: PaddedMap,
+}
+
+/// The weighted sums of a row.
+struct RowSums {
+    weight: Vec<f32>,
+    inverse_depth: Vec<f32>,
+    normal: [Vec<f32>; 3],
+}
+
+impl RowSums {
+    fn zeros(width: usize) -> RowSums {
         let zeros = || vec![0.0; width];
-        let mut sums =
-            Sums { weight: zeros(), inverse_depth: zeros(), normal: std::array::from_fn(|_| zeros()) };
+        RowSums { weight: zeros(), inverse_depth: zeros(), normal: std::array::from_fn(|_| zeros()) }
+    }
+
+    /// The mean plane at a column; NaN without any weight.
+    fn mean(&self, x: usize) -> PlaneHypothesis {
+        let normal = Vec3::from_array(std::array::from_fn(|axis| self.normal[axis][x]));
+        PlaneHypothesis { depth: self.weight[x] / self.inverse_depth[x], normal: normal.normalize_or_zero() }
+    }
+}
+
+impl PlaneMaps {
+    fn new(view: &FilteredView, estimates: &[PixelEstimate]) -> PlaneMaps {
+        let grid = view.grid();
+        let planes = validated_planes(view.camera, estimates);
+        let border = Border { width: RADIUS, value: 0.0 };
+        let padded = |value: &(dyn Fn(usize) -> f32 + Sync)| PaddedMap::new(grid, border, value);
+        PlaneMaps {
+            inverse_depth: padded(&|pixel| planes[pixel].inverse_depth),
+            slope: [padded(&|pixel| planes[pixel].slope_x), padded(&|pixel| planes[pixel].slope_y)],
+            normal: std::array::from_fn(|axis| padded(&|pixel| estimates[pixel].normal[axis])),
+            gray: padded(&|pixel| {
+                let (x, y) = grid.position(pixel);
+                f32::from(view.image.gray(x, y))
+            }),
+        }
+    }
+
+    fn sum_row(&self, y: usize, width: usize) -> RowSums {
+        let mut sums = RowSums::zeros(width);
         let radius = RADIUS as i32;
         for dy in (-radius..=radius).step_by(STEP) {
             for dx in (-radius..=radius).step_by(STEP) {
                 if dx * dx + dy * dy <= radius * radius + 1 {
-                    self.add(&mut sums, y, (dx, dy));
+                    self.add_neighbors(&mut sums, y, (dx, dy));
                 }
             }
         }
         sums
     }
 
-    /// Adds what the neighbors at an offset say to the sums of a row.
-    fn add(&self, sums: &mut Sums, y: usize, offset: (i32, i32)) {
+    /// Adds the neighbors at an offset to the sums of a row.
+    fn add_neighbors(&self, sums: &mut RowSums, y: usize, offset: Offset) {
         let width = sums.weight.len();
         let center = self.inverse_depth.row(y, (0, 0), width);
         let [cx, cy, cz] = [0, 1, 2].map(|axis| self.normal[axis].row(y, (0, 0), width));
@@ -93,18 +153,19 @@ impl Surface {
         let [nx, ny, nz] = [0, 1, 2].map(|axis| self.normal[axis].row(y, offset, width));
         let other_gray = self.gray.row(y, offset, width);
         let (dx, dy) = (offset.0 as f32, offset.1 as f32);
-        let far = (dx * dx + dy * dy) / (2.0 * SPATIAL_SIGMA * SPATIAL_SIGMA);
+        let distance = (dx * dx + dy * dy) / (2.0 * SPATIAL_SIGMA * SPATIAL_SIGMA);
         let [sum_x, sum_y, sum_z] = &mut sums.normal;
+        // Slices of one known length: the loop has no bounds checks and is vectorized.
         let (weights, depths) = (&mut sums.weight[..width], &mut sums.inverse_depth[..width]);
         let (sum_x, sum_y, sum_z) = (&mut sum_x[..width], &mut sum_y[..width], &mut sum_z[..width]);
         for x in 0..width {
             let predicted = inverse_depth[x] - slope_x[x] * dx - slope_y[x] * dy;
-            // Where there is no own plane the sums are not looked at.
+            // Infinite or NaN where the pixel itself has no validated plane: its sums are not used.
             let depth = (predicted - center[x]) / (center[x] * DEPTH_SIGMA);
             let normal = (1.0 - (nx[x] * cx[x] + ny[x] * cy[x] + nz[x] * cz[x])) * (1.0 / NORMAL_SCALE);
             let color = (other_gray[x] - gray[x]) * (1.0 / GRAY_SIGMA);
-            let exponent = 0.5 * (depth * depth + color * color) + normal + far;
-            // exp, near enough, and 0 from 8 on.
+            let exponent = 0.5 * (depth * depth + color * color) + normal + distance;
+            // exp(-e) as (1 - e / 8)^8: 0 from e = 8 on, and a few multiplications instead of a call.
             let root = 1.0 - exponent * 0.125;
             let root = if root > 0.0 { root } else { 0.0 };
             let root = if inverse_depth[x] > 0.0 { root } else { 0.0 };
@@ -122,27 +183,40 @@ impl Surface {
 
 #[cfg(test)]
 mod tests {
+    use super::super::contract::assert_contract;
     use super::*;
     use crate::ambc::Random;
-    use crate::image::Picture;
+    use crate::geometry::{Camera, DepthRange, MIN_FACING};
+    use crate::image::{PackedImage, Picture};
     use crate::testing::{self, RANGE};
 
     const SIZE: (u32, u32) = (44, 36);
+
+    #[test]
+    fn keeps_the_contract() {
+        assert_contract(|_, _| Box::new(SmoothPlanes { passes: 1 }));
+        assert_contract(|_, _| Box::new(SmoothPlanes { passes: 2 }));
+    }
 
     fn camera() -> Camera {
         testing::camera(0.0, SIZE)
     }
 
-    /// The wall, validated everywhere.
-    fn wall() -> Vec<PixelEstimate> {
-        let validated = |solution: PixelEstimate| PixelEstimate { validated: true, ..solution };
-        testing::exact(&camera()).solutions.into_iter().map(validated).collect()
+    fn is_right(pixel: usize) -> bool {
+        testing::place(&camera(), pixel).x > 20.0
     }
 
-    fn smooth_gray(range: DepthRange, solutions: &mut [PixelEstimate]) {
-        let gray = vec![100; solutions.len()];
-        let image = PackedImage::new(&Picture::from_gray(SIZE.0, SIZE.1, gray).unwrap());
-        smooth(&camera(), &image, range, solutions);
+    /// The wall, validated everywhere.
+    fn wall() -> Vec<PixelEstimate> {
+        let validated = |exact: PixelEstimate| PixelEstimate { validated: true, ..exact };
+        testing::exact(&camera()).planes.into_iter().map(validated).collect()
+    }
+
+    fn smooth(gray: impl Fn(usize) -> u8, range: DepthRange, planes: &mut [PixelEstimate]) {
+        let grays = (0..planes.len()).map(gray).collect();
+        let image = PackedImage::new(&Picture::from_gray(SIZE.0, SIZE.1, grays).unwrap());
+        let view = FilteredView { camera: &camera(), image: &image, range };
+        SmoothPlanes { passes: 1 }.apply(&view, planes);
     }
 
     fn ray(pixel: usize) -> Vec3 {
@@ -154,114 +228,109 @@ mod tests {
         Vec3::new(random.signed(), random.signed(), random.signed())
     }
 
-    fn assert_same_planes(solutions: &[PixelEstimate], expected: &[PixelEstimate]) {
-        for (solution, expected) in solutions.iter().zip(expected) {
-            assert!((solution.depth / expected.depth - 1.0).abs() < 1e-5, "{solution:?}, {expected:?}");
-            assert!((solution.normal - expected.normal).length() < 1e-5, "{solution:?}, {expected:?}");
+    fn assert_same_planes(planes: &[PixelEstimate], expected: &[PixelEstimate]) {
+        for (plane, expected) in planes.iter().zip(expected) {
+            assert!((plane.depth / expected.depth - 1.0).abs() < 1e-5, "{plane:?}, {expected:?}");
+            assert!((plane.normal - expected.normal).length() < 1e-5, "{plane:?}, {expected:?}");
         }
     }
 
-    /// Root mean square errors of the depth, relative, and of the normal.
-    fn errors(solutions: &[PixelEstimate], truth: &[PixelEstimate]) -> (f32, f32) {
+    /// Root mean square errors.
+    struct Errors {
+        /// Relative.
+        depth: f32,
+        normal: f32,
+    }
+
+    fn errors(planes: &[PixelEstimate], truth: &[PixelEstimate]) -> Errors {
         let (mut depth, mut normal) = (0.0, 0.0);
-        for (solution, truth) in solutions.iter().zip(truth) {
-            depth += (solution.depth / truth.depth - 1.0).powi(2);
-            normal += (solution.normal - truth.normal).length_squared();
+        for (plane, truth) in planes.iter().zip(truth) {
+            depth += (plane.depth / truth.depth - 1.0).powi(2);
+            normal += (plane.normal - truth.normal).length_squared();
         }
-        ((depth / truth.len() as f32).sqrt(), (normal / truth.len() as f32).sqrt())
+        let count = truth.len() as f32;
+        Errors { depth: (depth / count).sqrt(), normal: (normal / count).sqrt() }
     }
 
     #[test]
-    fn an_exact_plane_stays() {
-        let mut solutions = wall();
-        smooth_gray(RANGE, &mut solutions);
-        assert_same_planes(&solutions, &wall());
-    }
-
-    #[test]
-    fn errors_of_depth_and_normal_average_out() {
+    fn independent_errors_of_depth_and_normal_are_halved() {
         let truth = wall();
-        let mut solutions = truth.clone();
-        for (pixel, solution) in solutions.iter_mut().enumerate() {
+        let mut planes = truth.clone();
+        for (pixel, plane) in planes.iter_mut().enumerate() {
             let mut random = Random::new(3, pixel as u64);
-            solution.depth *= 1.0 + 0.003 * random.signed();
-            solution.normal = (solution.normal + 0.02 * signed(&mut random)).normalize();
+            plane.depth *= 1.0 + 0.003 * random.signed();
+            plane.normal = (plane.normal + 0.02 * signed(&mut random)).normalize();
         }
-        let before = errors(&solutions, &truth);
-        smooth_gray(RANGE, &mut solutions);
-        let after = errors(&solutions, &truth);
-        assert!(after.0 < 0.5 * before.0, "depths off by {} and before by {}", after.0, before.0);
-        assert!(after.1 < 0.5 * before.1, "normals off by {} and before by {}", after.1, before.1);
+        let before = errors(&planes, &truth);
+        smooth(|_| 100, RANGE, &mut planes);
+        let after = errors(&planes, &truth);
+        assert!(after.depth < 0.5 * before.depth, "depth: {} after {}", after.depth, before.depth);
+        assert!(after.normal < 0.5 * before.normal, "normal: {} after {}", after.normal, before.normal);
     }
 
     #[test]
-    fn surfaces_before_each_other_do_not_mix() {
+    fn surfaces_at_different_depths_do_not_mix() {
         let mut truth = wall();
-        for (pixel, solution) in truth.iter_mut().enumerate() {
-            if testing::place(&camera(), pixel).x > 20.0 {
-                solution.depth *= 1.03;
-            }
+        for (_, plane) in truth.iter_mut().enumerate().filter(|(pixel, _)| is_right(*pixel)) {
+            plane.depth *= 1.03;
         }
-        let mut solutions = truth.clone();
-        smooth_gray(RANGE, &mut solutions);
-        assert_same_planes(&solutions, &truth);
+        let mut planes = truth.clone();
+        smooth(|_| 100, RANGE, &mut planes);
+        assert_same_planes(&planes, &truth);
     }
 
     #[test]
-    fn neighbors_of_another_gray_value_do_not_count() {
-        let mut solutions = wall();
-        let is_right = |pixel: usize| testing::place(&camera(), pixel).x > 20.0;
-        for (pixel, solution) in solutions.iter_mut().enumerate() {
-            // Near enough to be taken for the same surface.
-            solution.depth *= if is_right(pixel) { 1.002 } else { 1.0 };
+    fn neighbors_with_another_gray_value_have_no_weight() {
+        let mut planes = wall();
+        for (_, plane) in planes.iter_mut().enumerate().filter(|(pixel, _)| is_right(*pixel)) {
+            // Close enough to count as the same surface.
+            plane.depth *= 1.002;
         }
-        let before = solutions.clone();
-        let grays = (0..solutions.len()).map(|pixel| if is_right(pixel) { 160 } else { 100 }).collect();
-        let image = PackedImage::new(&Picture::from_gray(SIZE.0, SIZE.1, grays).unwrap());
-        smooth(&camera(), &image, RANGE, &mut solutions);
-        assert_same_planes(&solutions, &before);
-        smooth_gray(RANGE, &mut solutions);
-        assert!(errors(&solutions, &before).0 > 1e-4, "where they look alike they do");
+        let before = planes.clone();
+        smooth(|pixel| if is_right(pixel) { 160 } else { 100 }, RANGE, &mut planes);
+        assert_same_planes(&planes, &before);
+        smooth(|_| 100, RANGE, &mut planes);
+        assert!(errors(&planes, &before).depth > 1e-4, "with equal gray values they have");
     }
 
     #[test]
-    fn what_is_not_validated_stays_and_has_no_say() {
-        let mut solutions = wall();
-        for (pixel, solution) in solutions.iter_mut().enumerate().filter(|(pixel, _)| pixel % 3 == 0) {
-            solution.validated = false;
-            solution.depth *= if pixel % 2 == 0 { 1.001 } else { 0.0 };
+    fn planes_that_are_not_validated_stay_and_have_no_weight() {
+        let mut planes = wall();
+        for (pixel, plane) in planes.iter_mut().enumerate().filter(|(pixel, _)| pixel % 3 == 0) {
+            plane.validated = false;
+            plane.depth *= if pixel % 2 == 0 { 1.001 } else { 0.0 };
         }
-        let before = solutions.clone();
-        smooth_gray(RANGE, &mut solutions);
-        for (solution, before) in solutions.iter().zip(&before).filter(|(_, before)| !before.validated) {
-            assert_eq!((solution.depth, solution.normal), (before.depth, before.normal));
+        let before = planes.clone();
+        smooth(|_| 100, RANGE, &mut planes);
+        for (plane, before) in planes.iter().zip(&before).filter(|(_, before)| !before.validated) {
+            assert_eq!(plane, before);
         }
-        let validated = |solutions: &[PixelEstimate]| {
-            solutions.iter().copied().filter(|s| s.validated).collect::<Vec<_>>()
+        let validated = |planes: &[PixelEstimate]| -> Vec<PixelEstimate> {
+            planes.iter().copied().filter(|plane| plane.validated).collect()
         };
-        assert_same_planes(&validated(&solutions), &validated(&before));
+        assert_same_planes(&validated(&planes), &validated(&before));
     }
 
     #[test]
-    fn no_plane_leaves_the_depth_range_or_turns_away() {
+    fn planes_stay_in_the_depth_range_and_keep_facing_the_camera() {
         let range = DepthRange { near: 4.99, far: 5.01 };
         let mut moved = 0;
         for tilt in [0.1, 1.0, 3.0] {
-            let mut solutions = wall();
-            for (pixel, solution) in solutions.iter_mut().enumerate() {
+            let mut planes = wall();
+            for (pixel, plane) in planes.iter_mut().enumerate() {
                 let mut random = Random::new(4, pixel as u64);
-                solution.depth = 5.0 + 0.0099 * random.signed();
+                plane.depth = 5.0 + 0.0099 * random.signed();
                 let steep = ray(pixel).cross(Vec3::Y).normalize() - 0.03 * ray(pixel).normalize();
                 let normal = (steep + tilt * signed(&mut random)).normalize();
                 let is_facing = normal.dot(ray(pixel)) < -MIN_FACING;
-                solution.normal = if is_facing { normal } else { steep.normalize() };
+                plane.normal = if is_facing { normal } else { steep.normalize() };
             }
-            let before = solutions.clone();
-            smooth_gray(range, &mut solutions);
-            for (pixel, solution) in solutions.iter().enumerate() {
-                assert!((range.near as f32..=range.far as f32).contains(&solution.depth), "{solution:?}");
-                assert!(solution.normal.is_normalized() && solution.normal.dot(ray(pixel)) < -MIN_FACING);
-                moved += usize::from(solution.depth != before[pixel].depth);
+            let before = planes.clone();
+            smooth(|_| 100, range, &mut planes);
+            for (pixel, plane) in planes.iter().enumerate() {
+                assert!((range.near as f32..=range.far as f32).contains(&plane.depth), "{plane:?}");
+                assert!(plane.normal.is_normalized() && plane.normal.dot(ray(pixel)) < -MIN_FACING);
+                moved += usize::from(plane.depth != before[pixel].depth);
             }
         }
         assert!(moved > 1000, "{moved} planes moved");

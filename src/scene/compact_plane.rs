@@ -1,20 +1,20 @@
-//! What a view shows of its validated solutions to the other views.
+//! The validated planes that a view publishes to other views.
 
 use crate::geometry::SlantedPlane;
 
-/// A validated solution as other views look it up, wherever their hypotheses fall: a [`SlantedPlane`] in eight bytes, so
-/// that more of them stay in cache. Slopes have the upper half of an f32's bits, a relative error of 2^-9 at most: at
-/// half a pixel's distance that is less than a millionth of most depths.
+/// A validated plane as other views look it up: a [`SlantedPlane`] in eight bytes, so that more of them stay in cache.
+/// Slopes have the upper half of an f32's bits, a relative error of 2^-9 at most: half a pixel away that is less than a
+/// millionth of most depths.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CompactPlane {
-    /// 0 where nothing is shown.
+    /// 0 where nothing is validated.
     inverse_depth: f32,
     /// Along x in the upper half, along y in the lower one.
     slopes: u32,
 }
 
 impl CompactPlane {
-    /// Inverse depth at the pixel; 0 where nothing is shown.
+    /// Inverse depth at the pixel, 0 where nothing is validated.
     #[inline(always)]
     pub fn inverse_depth(&self) -> f32 {
         self.inverse_depth
@@ -44,9 +44,9 @@ mod tests {
     fn slopes_are_kept_to_a_half_thousandth_and_inverse_depths_exactly() {
         for slope in [0.0, 1e-3, -1e-3, 0.123_456, -7.0, 3.3e-9] {
             let plane = SlantedPlane { inverse_depth: 0.7, slope_x: slope, slope_y: -0.5 * slope };
-            let shown = CompactPlane::from(plane);
-            assert_eq!(shown.inverse_depth(), 0.7);
-            let (x, y) = shown.slopes();
+            let compact = CompactPlane::from(plane);
+            assert_eq!(compact.inverse_depth(), 0.7);
+            let (x, y) = compact.slopes();
             assert!((x - slope).abs() <= slope.abs() / 512.0, "{x} for {slope}");
             assert!((y + 0.5 * slope).abs() <= slope.abs() / 1024.0, "{y} for {}", -0.5 * slope);
         }

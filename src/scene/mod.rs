@@ -2,17 +2,17 @@
 
 mod compact_plane;
 mod maps;
-pub(crate) mod plane_map;
+mod plane_map;
 mod scaled_view;
 
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, DepthRange};
 use crate::image::Picture;
-pub use compact_plane::CompactPlane;
+pub(crate) use compact_plane::CompactPlane;
 use glam::DVec3;
 pub use maps::{Maps, PixelStatus};
-pub use plane_map::{PixelEstimate, PlaneMap, surface};
-pub use scaled_view::ScaledView;
+pub(crate) use plane_map::{PixelEstimate, PlaneMap, Verdict, validated_planes};
+pub(crate) use scaled_view::ScaledView;
 
 /// One calibrated photograph.
 #[derive(Debug, Clone)]

@@ -16,7 +16,7 @@ use tempfile::{TempDir, tempdir};
 fn result() -> ViewResult {
     let mut result = ViewResult {
         width: 6,
-        estimate: Maps { depth: vec![0.0; 24], normal: vec![[0.0; 3]; 24] },
+        raw: Maps { depth: vec![0.0; 24], normal: vec![[0.0; 3]; 24] },
         cost: vec![0.0; 24],
         status: vec![PixelStatus::Masked; 24],
         sources: vec![5, 2],
@@ -25,8 +25,8 @@ fn result() -> ViewResult {
         cycles: vec![],
     };
     for (pixel, status) in [(3, PixelStatus::Validated), (4, PixelStatus::Inconsistent)] {
-        result.estimate.depth[pixel] = pixel as f32;
-        result.estimate.normal[pixel] = [0.0, 0.6, -0.8];
+        result.raw.depth[pixel] = pixel as f32;
+        result.raw.normal[pixel] = [0.0, 0.6, -0.8];
         result.status[pixel] = status;
         result.view_sets.insert(pixel, 1);
     }
@@ -61,9 +61,9 @@ fn a_view_is_written_as_colmap_lays_it_out() {
         assert!(workspace.folder().join(file).is_file(), "{file}");
     }
     let raw = workspace.read_maps(NAME, MapKind::Raw, &camera(0.0)).unwrap();
-    assert_eq!(raw, result().estimate);
+    assert_eq!(raw, result().raw);
     let validated = workspace.read_maps(NAME, MapKind::Validated, &camera(0.0)).unwrap();
-    assert_eq!(validated, result().filtered());
+    assert_eq!(validated, result().validated());
     assert_eq!((validated.depth[3], validated.depth[4]), (3.0, 0.0));
 }
 
@@ -138,13 +138,13 @@ fn all_maps_of_a_workspace_are_read_and_missing_ones_named() {
     );
     assert_eq!(maps.views[0].maps.depth, [0.0; 24], "views keep their places in the file");
     assert!(maps.views[0].picture.is_none());
-    assert_eq!(maps.views[1].maps, result().filtered());
+    assert_eq!(maps.views[1].maps, result().validated());
     assert_eq!(maps.views[1].picture.as_ref().unwrap().rgb(0), [1, 50, 60]);
     assert_eq!(maps.points.len(), 3);
 
     std::fs::remove_file(workspace.depth_map(NAME, MapKind::Validated)).unwrap();
     let maps = workspace.read(&found).unwrap();
-    assert_eq!((maps.kind, &maps.views[1].maps), (MapKind::Raw, &result().estimate));
+    assert_eq!((maps.kind, &maps.views[1].maps), (MapKind::Raw, &result().raw));
 }
 
 #[test]

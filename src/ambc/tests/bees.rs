@@ -3,8 +3,10 @@
 use super::*;
 use crate::ambc::colony::{Colonies, color};
 use crate::ambc::food_source::cost_to_beat;
+use crate::ambc::onlooker::OnlookerRules;
 use crate::ambc::random::Random;
-use crate::ambc::{OnlookerRules, employed, onlooker, scout};
+use crate::ambc::{employed, onlooker, scout};
+use crate::geometry::Grid;
 use crate::geometry::MIN_FACING;
 use crate::testing::window;
 use glam::Vec3;
@@ -18,7 +20,7 @@ const ALL: usize = usize::MAX;
 fn employed_bees_keep_only_what_is_better_and_count_their_trials() {
     let (world, window) = (World::five(), window());
     let problem = world.problem();
-    let mut evaluator = standing(&problem, &window, &options(), false);
+    let mut evaluator = at_pixel(&problem, &window, &options(), false);
     let mut foods = [1.0, 1.1, 0.7, 1.5].map(|factor| evaluated(&mut evaluator, wall(&world, PIXEL, factor)));
     let mut random = Random::new(1, 2);
     let mut improved = 0;
@@ -44,7 +46,7 @@ fn employed_bees_keep_only_what_is_better_and_count_their_trials() {
 fn employed_bees_stay_in_the_depth_range_and_on_the_visible_side() {
     let (world, window) = (World::five(), window());
     let problem = world.problem();
-    let mut evaluator = standing(&problem, &window, &options(), false);
+    let mut evaluator = at_pixel(&problem, &window, &options(), false);
     let ray = evaluator.ray();
     let grazing = [Vec3::new(-0.99, 0.0, -0.2), Vec3::new(0.99, 0.1, -0.2)].map(|normal| normal.normalize());
     let mut kept = 0;
@@ -69,7 +71,7 @@ fn employed_bees_stay_in_the_depth_range_and_on_the_visible_side() {
 fn employed_bees_work_on_the_first_food_sources_only_where_they_are_told_so() {
     let (world, window) = (World::five(), window());
     let problem = world.problem();
-    let mut evaluator = standing(&problem, &window, &options(), false);
+    let mut evaluator = at_pixel(&problem, &window, &options(), false);
     let before = [1.0, 1.1, 0.7].map(|factor| evaluated(&mut evaluator, wall(&world, PIXEL, factor)));
     let mut foods = before;
     employed::send(&mut evaluator, &mut foods, 1, &mut Random::new(1, 2));
@@ -79,18 +81,18 @@ fn employed_bees_work_on_the_first_food_sources_only_where_they_are_told_so() {
 
 // Onlooker bees.
 
-/// Onlookers that go to the first neighbor drawn.
+/// Onlookers that visit the first random neighbor.
 fn plain(reward: f32) -> OnlookerRules {
-    OnlookerRules { reward, draws: 1 }
+    OnlookerRules { reward, tournament_size: 1 }
 }
 
 /// Colonies in which every pixel of the other color has the wall as its best, its depth multiplied.
 fn neighbors(world: &World, factor: f32, validated: bool) -> Colonies {
     let (width, height) = (world.images[0].width, world.images[0].height);
-    let mut colonies = Colonies::new(width, height, 1);
-    let other = 1 - color(PIXEL.0, PIXEL.1);
+    let mut colonies = Colonies::new(Grid { width, height }, 1);
+    let other = 1 - color(PIXEL);
     for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-        if color(x, y) == other {
+        if color((x, y)) == other {
             let at = y * colonies.row_len() + x / 2;
             colonies.foods[at] = FoodSource { validated, cost: 0.0, ..wall(world, (x, y), factor) };
         }
@@ -99,10 +101,10 @@ fn neighbors(world: &World, factor: f32, validated: bool) -> Colonies {
 }
 
 #[test]
-fn onlookers_bring_a_neighbor_s_plane_to_the_pixel() {
+fn onlookers_transfer_a_neighbor_s_plane_to_the_pixel() {
     let (world, window) = (World::five(), window());
     let problem = world.problem();
-    let mut evaluator = standing(&problem, &window, &options(), false);
+    let mut evaluator = at_pixel(&problem, &window, &options(), false);
     let neighbors = neighbors(&world, 1.0, false);
     let wrong = evaluated(&mut evaluator, wall(&world, PIXEL, 1.2));
     for seed in 0..100 {
@@ -117,11 +119,11 @@ fn onlookers_bring_a_neighbor_s_plane_to_the_pixel() {
 }
 
 #[test]
-fn of_the_neighbors_drawn_the_one_of_the_cheapest_plane_is_visited() {
+fn of_the_neighbors_drawn_the_one_of_the_plane_of_lowest_cost_is_visited() {
     let (world, window) = (World::five(), window());
     let problem = world.problem();
-    let mut evaluator = standing(&problem, &window, &options(), false);
-    // The neighbors to the left know the wall, the others a plane that costs them more.
+    let mut evaluator = at_pixel(&problem, &window, &options(), false);
+    // The neighbors to the left have the wall, the others a plane of higher cost.
     let mut neighbors = neighbors(&world, 1.0, false);
     for (x, y) in (0..28).flat_map(|y| (PIXEL.0..36).map(move |x| (x, y))) {
         let at = y * neighbors.row_len() + x / 2;
@@ -132,7 +134,7 @@ fn of_the_neighbors_drawn_the_one_of_the_cheapest_plane_is_visited() {
     let wrong = evaluated(&mut evaluator, wall(&world, PIXEL, 1.2));
     let mut found_by = |draws: u32| {
         let finds = |seed: &u64| {
-            let (mut foods, rules) = ([wrong], OnlookerRules { reward: 0.0, draws });
+            let (mut foods, rules) = ([wrong], OnlookerRules { reward: 0.0, tournament_size: draws });
             onlooker::send(&mut evaluator, &mut foods, &neighbors, PIXEL, rules, &mut Random::new(3, *seed));
             (foods[0].depth / wall(&world, PIXEL, 1.0).depth - 1.0).abs() < 1e-5
         };
@@ -146,23 +148,23 @@ fn of_the_neighbors_drawn_the_one_of_the_cheapest_plane_is_visited() {
 }
 
 #[test]
-fn of_equally_cheap_planes_the_one_of_the_neighbor_that_looks_most_alike_is_visited() {
+fn of_planes_of_equal_cost_the_one_of_the_neighbor_that_is_most_similar_is_visited() {
     let world = World::five();
     let window = Window::new(5, 2, 5.0, 0.03, 1e-5);
     let problem = world.problem();
-    let mut evaluator = standing(&problem, &window, &options(), false);
+    let mut evaluator = at_pixel(&problem, &window, &options(), false);
     let place = |(dx, dy): (i32, i32)| {
         (PIXEL.0.wrapping_add_signed(dx as isize), PIXEL.1.wrapping_add_signed(dy as isize))
     };
     let difference =
         |(x, y): (usize, usize)| problem.image.gray(x, y).abs_diff(problem.image.gray(PIXEL.0, PIXEL.1));
-    let most_alike = onlooker::OFFSETS.into_iter().map(place).min_by_key(|&at| difference(at)).unwrap();
+    let most_similar = onlooker::OFFSETS.into_iter().map(place).min_by_key(|&at| difference(at)).unwrap();
     let mut neighbors = neighbors(&world, 1.1, false);
-    let at = most_alike.1 * neighbors.row_len() + most_alike.0 / 2;
-    neighbors.foods[at] = FoodSource { cost: 0.0, ..wall(&world, most_alike, 1.0) };
+    let at = most_similar.1 * neighbors.row_len() + most_similar.0 / 2;
+    neighbors.foods[at] = FoodSource { cost: 0.0, ..wall(&world, most_similar, 1.0) };
     let wrong = evaluated(&mut evaluator, wall(&world, PIXEL, 1.2));
     for seed in 0..20 {
-        let (mut foods, rules) = ([wrong], OnlookerRules { reward: 0.0, draws: 300 });
+        let (mut foods, rules) = ([wrong], OnlookerRules { reward: 0.0, tournament_size: 300 });
         onlooker::send(&mut evaluator, &mut foods, &neighbors, PIXEL, rules, &mut Random::new(3, seed));
         let off = foods[0].depth / wall(&world, PIXEL, 1.0).depth - 1.0;
         assert!(off.abs() < 1e-5, "{off} after seed {seed}");
@@ -174,7 +176,7 @@ fn a_slightly_dearer_plane_is_taken_from_a_validated_neighbor_only_and_at_its_tr
     const REWARD: f32 = 0.05;
     let (world, window) = (World::five(), window());
     let problem = world.problem();
-    let mut evaluator = standing(&problem, &window, &options(), false);
+    let mut evaluator = at_pixel(&problem, &window, &options(), false);
     let own = evaluated(&mut evaluator, wall(&world, PIXEL, 1.0));
     let mut cost = |factor| evaluator.cost(&wall(&world, PIXEL, factor), f32::INFINITY);
     let dearer = |cost: f32| (own.cost + 0.01..cost_to_beat(own.cost, REWARD) - 0.01).contains(&cost);
@@ -199,13 +201,13 @@ fn a_slightly_dearer_plane_is_taken_from_a_validated_neighbor_only_and_at_its_tr
 }
 
 #[test]
-fn neighbors_that_were_never_searched_bring_nothing() {
+fn neighbors_that_were_never_searched_propose_nothing() {
     let (world, window) = (World::five(), window());
     let problem = world.problem();
-    let mut evaluator = standing(&problem, &window, &options(), false);
+    let mut evaluator = at_pixel(&problem, &window, &options(), false);
     let own = evaluated(&mut evaluator, wall(&world, PIXEL, 1.3));
     let mut foods = [own];
-    let empty = Colonies::new(36, 28, 1);
+    let empty = Colonies::new(Grid { width: 36, height: 28 }, 1);
     onlooker::send(&mut evaluator, &mut foods, &empty, PIXEL, plain(0.1), &mut Random::new(3, 4));
     assert_eq!(foods, [FoodSource { trials: 1, ..own }]);
 }
@@ -227,7 +229,7 @@ fn onlookers_visit_the_other_color_only() {
 fn a_scout_replaces_the_stalest_beyond_the_limit_and_never_the_best() {
     let (world, window) = (World::five(), window());
     let problem = world.problem();
-    let mut evaluator = standing(&problem, &window, &options(), false);
+    let mut evaluator = at_pixel(&problem, &window, &options(), false);
     let mut random = Random::new(5, 6);
     let food = evaluated(&mut evaluator, wall(&world, PIXEL, 1.1));
     let mut foods = [50, 11, 13, 10, 13].map(|trials| FoodSource { trials, ..food });
@@ -248,12 +250,12 @@ fn a_scout_replaces_the_stalest_beyond_the_limit_and_never_the_best() {
 }
 
 #[test]
-fn the_best_stands_first_with_its_trials_and_of_equals_the_earlier() {
+fn the_best_is_first_with_its_trials_and_of_equals_the_earlier() {
     let food = |cost, trials| FoodSource { cost, trials, ..FoodSource::new(1.0, Vec3::NEG_Z) };
     let mut foods = [food(0.5, 1), food(0.2, 2), food(0.2, 3)];
     let (world, window) = (World::five(), window());
     let problem = world.problem();
-    let evaluator = standing(&problem, &window, &options(), false);
+    let evaluator = at_pixel(&problem, &window, &options(), false);
     evaluator.best_first(&mut foods);
     assert_eq!(foods, [food(0.2, 2), food(0.5, 1), food(0.2, 3)]);
     let mut unevaluated = [food(f32::INFINITY, 1), food(f32::INFINITY, 2)];
@@ -261,10 +263,10 @@ fn the_best_stands_first_with_its_trials_and_of_equals_the_earlier() {
     assert_eq!(unevaluated[0].trials, 1);
 }
 
-// The neighbors' say.
+// The smoothness term.
 
 #[test]
-fn a_plane_that_continues_the_validated_neighbors_is_preferred_and_others_pay_up_to_a_limit() {
+fn a_plane_that_continues_the_validated_neighbors_is_preferred_and_others_cost_up_to_a_limit() {
     let (world, window) = (World::five(), window());
     let problem = world.problem();
     let smooth = changed(options(), |o| {
@@ -274,15 +276,15 @@ fn a_plane_that_continues_the_validated_neighbors_is_preferred_and_others_pay_up
         o.window.sigma_color = 1e3;
     });
     let food = |cost, factor| FoodSource { cost, ..wall(&world, PIXEL, factor) };
-    // The dearer plane stands first exactly if what it saves in smoothness is more.
+    // The plane of higher cost is first exactly if it saves more in smoothness.
     let prefers_wall = |validated, factor, extra: f32| {
-        let mut evaluator = standing(&problem, &window, &smooth, false);
-        evaluator.look_around(&neighbors(&world, 1.0, validated), PIXEL);
+        let mut evaluator = at_pixel(&problem, &window, &smooth, false);
+        evaluator.load_neighbors(&neighbors(&world, 1.0, validated), PIXEL);
         let mut foods = [food(0.1, factor), food(0.1 + extra, 1.0)];
         evaluator.best_first(&mut foods);
         foods[0] == food(0.1 + extra, 1.0)
     };
-    assert!(!prefers_wall(false, 1.05, 0.001), "neighbors that are not validated have no say");
+    assert!(!prefers_wall(false, 1.05, 0.001), "neighbors that are not validated have no weight");
     assert!(
         prefers_wall(true, 1.005, 0.03) && !prefers_wall(true, 1.005, 0.07),
         "half of the limit, by square"
@@ -292,7 +294,7 @@ fn a_plane_that_continues_the_validated_neighbors_is_preferred_and_others_pay_up
 }
 
 #[test]
-fn neighbors_of_another_gray_have_no_say() {
+fn neighbors_of_another_gray_have_no_weight() {
     let mut world = World::five();
     let gray = |x: usize, y: usize| if (x, y) == PIXEL { 255 } else { 90 };
     let (width, height) = (world.images[0].width, world.images[0].height);
@@ -303,8 +305,8 @@ fn neighbors_of_another_gray_have_no_say() {
     let smooth = changed(options(), |o| {
         o.cost.smoothness_weight = 0.2;
     });
-    let mut evaluator = standing(&problem, &window, &smooth, false);
-    evaluator.look_around(&neighbors(&world, 1.0, true), PIXEL);
+    let mut evaluator = at_pixel(&problem, &window, &smooth, false);
+    evaluator.load_neighbors(&neighbors(&world, 1.0, true), PIXEL);
     let food = |cost, factor| FoodSource { cost, ..wall(&world, PIXEL, factor) };
     let mut foods = [food(0.1, 1.05), food(0.12, 1.0)];
     evaluator.best_first(&mut foods);

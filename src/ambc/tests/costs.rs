@@ -10,7 +10,7 @@ fn the_wall_costs_less_than_planes_before_and_behind_it() {
     let (world, window) = (World::five(), window());
     let problem = world.problem();
     for best_views in [0, 3] {
-        let mut evaluator = standing(
+        let mut evaluator = at_pixel(
             &problem,
             &window,
             &changed(options(), |o| {
@@ -37,10 +37,10 @@ fn a_cost_is_the_sum_over_all_but_one_or_the_mean_of_the_best() {
         let options = changed(options(), |o| {
             o.cost.best_views = best_views;
         });
-        let mut evaluator = standing(&problem, &window, &options, false);
+        let mut evaluator = at_pixel(&problem, &window, &options, false);
         let mut set = [0];
         views.iter().for_each(|&view| ViewSets::insert_into(&mut set, view));
-        evaluator.go_to(PIXEL.0, PIXEL.1, &set);
+        evaluator.set_pixel(PIXEL, &set);
         evaluator.cost(&food, f32::INFINITY)
     };
     let pair = |a, b| cost_of(&[a, b], 0);
@@ -71,7 +71,7 @@ fn giving_up_early_changes_no_decision() {
     let (world, window) = (World::five(), window());
     let problem = world.problem();
     for best_views in [0, 2, 4] {
-        let mut evaluator = standing(
+        let mut evaluator = at_pixel(
             &problem,
             &window,
             &changed(options(), |o| {
@@ -101,7 +101,7 @@ fn a_view_without_the_hypothesis_in_its_image_does_not_count() {
     });
     let cost = |world: &World| {
         let problem = world.problem();
-        let mut evaluator = standing(&problem, &window, &options, false);
+        let mut evaluator = at_pixel(&problem, &window, &options, false);
         evaluator.cost(&wall(world, PIXEL, 1.05), f32::INFINITY)
     };
     world.cameras[3].cx += 100.0;
@@ -111,7 +111,7 @@ fn a_view_without_the_hypothesis_in_its_image_does_not_count() {
 }
 
 #[test]
-fn disagreeing_with_validated_depths_costs_up_to_a_limit() {
+fn the_geometric_term_grows_up_to_a_limit() {
     let (mut world, window) = (World::five(), window());
     let options = changed(options(), |o| {
         o.cost.best_views = 8;
@@ -123,16 +123,15 @@ fn disagreeing_with_validated_depths_costs_up_to_a_limit() {
         let problem = world.problem();
         let food = wall(world, PIXEL, factor);
         let [with, without] = [true, false]
-            .map(|geometric| standing(&problem, &window, &options, geometric).cost(&food, f32::INFINITY));
+            .map(|geometric| at_pixel(&problem, &window, &options, geometric).cost(&food, f32::INFINITY));
         with - without
     };
     // Nothing is validated yet: half of the limit is assumed, which costs a quarter.
     assert!((penalty(&world, 1.0) - 0.15).abs() < 1e-5);
     for view in 1..5 {
-        let mut state = testing::exact(&world.cameras[view]);
-        let validated = vec![(4, true); state.solutions.len()];
-        state.mark(&world.cameras[view], &validated);
-        world.surfaces[view] = state.surface;
+        let mut map = testing::exact(&world.cameras[view]);
+        map.set_verdicts(&vec![(4, true); map.planes.len()]);
+        world.surfaces[view] = map.publish(&world.cameras[view]);
     }
     assert!(penalty(&world, 1.0).abs() < 1e-3);
     let [half, one, two] = [1.005, 1.01, 1.02].map(|factor| penalty(&world, factor));
@@ -147,30 +146,29 @@ fn fitness_falls_as_the_cost_grows() {
 }
 
 #[test]
-fn a_pixel_focuses_on_the_views_whose_surfaces_agree_and_without_them_on_those_that_match_best() {
+fn the_views_kept_are_those_whose_surfaces_agree_or_else_those_that_match_best() {
     let (mut world, window) = (World::five(), window());
     let food = wall(&world, PIXEL, 1.0);
-    let focused = |world: &World, geometric, food: &FoodSource| {
+    let kept_views = |world: &World, geometric, food: &FoodSource| {
         let problem = world.problem();
-        let mut evaluator = standing(&problem, &window, &options(), geometric);
+        let mut evaluator = at_pixel(&problem, &window, &options(), geometric);
         let mut set = [0b1111];
-        let cost = evaluator.focus(food, 3, &mut set);
+        let cost = evaluator.keep_best_views(food, 3, &mut set);
         assert_eq!(set[0].count_ones(), 3);
         assert_eq!(cost, evaluator.cost(food, f32::INFINITY), "the cost in the views kept");
         (set[0], evaluator.counts.ncc_evaluations)
     };
     // One image shows something else.
     world.images[2] = PackedImage::new(&Picture::from_gray(36, 28, vec![7; 36 * 28]).unwrap());
-    assert_eq!(focused(&world, false, &food), (0b1101, 4 + 3));
-    // One surface lies elsewhere: it is known without looking at any image.
+    assert_eq!(kept_views(&world, false, &food), (0b1101, 4 + 3));
+    // One surface lies elsewhere: it is known without any matching.
     for view in 1..5 {
-        let mut state = testing::exact(&world.cameras[view]);
+        let mut map = testing::exact(&world.cameras[view]);
         if view == 4 {
-            state.solutions.iter_mut().for_each(|solution| solution.depth *= 1.1);
+            map.planes.iter_mut().for_each(|plane| plane.depth *= 1.1);
         }
-        let validated = vec![(4, true); state.solutions.len()];
-        state.mark(&world.cameras[view], &validated);
-        world.surfaces[view] = state.surface;
+        map.set_verdicts(&vec![(4, true); map.planes.len()]);
+        world.surfaces[view] = map.publish(&world.cameras[view]);
     }
-    assert_eq!(focused(&world, true, &food), (0b0111, 3 + 3));
+    assert_eq!(kept_views(&world, true, &food), (0b0111, 3 + 3));
 }

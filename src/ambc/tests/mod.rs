@@ -6,8 +6,9 @@ mod local_plane;
 mod planes;
 mod search;
 
+use super::CostRules;
 use super::cost::Evaluator;
-use super::{CostRules, FoodSource};
+use super::food_source::FoodSource;
 use crate::geometry::ViewSets;
 use crate::matching::Problem;
 use crate::matching::Window;
@@ -25,8 +26,8 @@ fn options() -> Options {
     })
 }
 
-/// An evaluator that stands at the pixel with all sources in its set.
-fn standing<'a>(
+/// An evaluator of the pixel with all sources in its set.
+fn at_pixel<'a>(
     problem: &'a Problem<'a>,
     window: &'a Window,
     options: &Options,
@@ -35,7 +36,7 @@ fn standing<'a>(
     let mut evaluator = Evaluator::new(Scalar, problem, window, CostRules::new(options, with_geometric_term));
     let mut set = vec![0; problem.sources.len().div_ceil(32)];
     ViewSets::fill_words(&mut set, problem.sources.len());
-    evaluator.go_to(PIXEL.0, PIXEL.1, &set);
+    evaluator.set_pixel(PIXEL, &set);
     evaluator
 }
 

@@ -50,10 +50,9 @@ fn a_plane_transferred_to_another_pixel_is_the_same_plane() {
 #[test]
 fn a_validated_plane_shown_by_a_source_is_the_wall_between_its_pixels_too() {
     let mut world = World::five();
-    let mut state = testing::exact(&world.cameras[1]);
-    let validated = vec![(2, true); state.solutions.len()];
-    state.mark(&world.cameras[1], &validated);
-    world.surfaces[1] = state.surface;
+    let mut map = testing::exact(&world.cameras[1]);
+    map.set_verdicts(&vec![(4, true); map.planes.len()]);
+    world.surfaces[1] = map.publish(&world.cameras[1]);
     let problem = world.problem();
     let mut projector = SourceProjector::new(Scalar, &problem);
     projector.set_pixel_and_views(0.0, 0.0, &[0b11]);

@@ -58,11 +58,11 @@ fn fuse_maps(maps: &WorkspaceMaps, display: Display, interrupt: &Interrupt) -> s
         })
         .collect();
     let follower = display.follow();
-    let hook = |progress: &Progress| {
+    let progress = |progress: &Progress| {
         follower.show(progress);
         interrupt.control_flow()
     };
-    let cloud = fuse(&views, &Options::default().fusion, &hook)?;
+    let cloud = fuse(&views, &Options::default().fusion, &progress)?;
     interrupt.check().map(|()| cloud)
 }
 

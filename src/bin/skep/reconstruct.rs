@@ -9,7 +9,7 @@ use crate::stopwatch::{Stage, Stopwatch};
 use crate::{Failure, streams};
 use rayon::prelude::*;
 use skep::io::{SceneFolder, Workspace, read_scene};
-use skep::{Error, Hook, PixelStatus, Progress, Reconstruction, Result, Scene};
+use skep::{Error, PixelStatus, Progress, ProgressFn, Reconstruction, Result, Scene};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -31,7 +31,7 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
     }
 
     let interrupt = Interrupt::watch();
-    let estimate = |progress: Hook| match &arguments.dump {
+    let estimate = |progress: ProgressFn| match &arguments.dump {
         Some(folder) => {
             pool(options.threads)?.install(|| dump::reconstruct(&scene, &options, folder, progress))
         }
@@ -62,7 +62,7 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
 
 /// Estimates and fuses, timed and with its progress shown, until it is done or interrupted.
 fn followed(
-    estimate: &dyn Fn(Hook) -> Result<Reconstruction>,
+    estimate: &dyn Fn(ProgressFn) -> Result<Reconstruction>,
     display: Display,
     stopwatch: &Mutex<Stopwatch>,
     interrupt: &Interrupt,

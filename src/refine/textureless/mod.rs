@@ -1,6 +1,21 @@
-//! Filling, beyond the paper: where the image shows nothing but noise no search finds a surface, but what surrounds such a
-//! place tells of it. Each connected part is filled with one of the planes that its surroundings lie on: the one by which
-//! the part looks the same in the source views. It must pass the consistency check like everything else.
+//! Filling of textureless regions: where the image has nothing but noise no search finds a surface, but the
+//! surroundings suggest one.
+//!
+//! ```text
+//! for each connected region of textureless pixels without a validated plane:
+//!     skip it unless validated pixels surround most of its outline
+//!     grow it by the adjacent pixels of similar gray value         (only if it ends within the image)
+//!     fit planes to the validated pixels around it                 (rim_planes)
+//!     score each plane by how well the outline matches the source views through it   (photo_check)
+//!     give the best plane to all pixels of the region
+//! ```
+//!
+//! Reads the validated planes, the gray values of the view and of its source views; changes depth, normal and
+//! `validated` of the pixels of a region, and keeps their cost. `validated` means here that the plane comes
+//! from a validated plane; the next check decides about the filled ones like about all others.
+//!
+//! Linear in the number of pixels, and for each region `MAX_PLANES` RANSAC searches and as many photo checks,
+//! which have bounded numbers of samples.
 
 mod photo_check;
 mod region;
@@ -8,94 +23,153 @@ mod rim_planes;
 #[cfg(test)]
 mod tests;
 
-use crate::ambc::FoodSource;
-use crate::geometry::SlantedPlane;
+use super::{Domain, Filter, FilteredView};
+use crate::geometry::{Grid, PlaneHypothesis, SlantedPlane};
 use crate::matching::Problem;
+use crate::scene::PixelEstimate;
 use glam::DVec3;
-use photo_check::Looks;
-use region::{Marks, Part};
-use rim_planes::{RimPlane, Witness, common_planes};
+use photo_check::PhotoCheck;
+use region::{PixelSet, Region};
+use rim_planes::{RimPlane, RimSample, fit_rim_planes};
 
-/// Share of the rim that must lie on the plane, reckoned as if the rim went on along the border of the image without lying
-/// on it, where the source views agree with the plane, and where they cannot tell: a sky goes on from the ground on one
-/// side only.
-const MIN_SHARE_SEEN: f64 = 0.2;
-const MIN_SHARE_UNSEEN: f64 = 0.6;
-/// Share of the part's outline that must look the same in the source views.
-const MIN_LOOKS: f64 = 0.8;
-/// How much a plane that the whole rim lies on may look worse than one nothing lies on.
-const WORTH_OF_SHARE: f64 = 0.1;
+/// Fraction of a region's outline that must lie beside pixels on the plane, where the photo check confirms
+/// the plane: a panel may touch its own surface on one side only.
+const MIN_RIM_CONFIRMED: f64 = 0.2;
+/// The same where too few source views see the region for a photo check: the ground below a sky is on one
+/// side of it only, and must not fill it.
+const MIN_RIM_UNCHECKED: f64 = 0.6;
+/// Fraction of the outline that must match in the source views. Chosen on renderings.
+const MIN_MATCHING: f64 = 0.8;
+/// Weight of the fraction of the rim that is on a plane against the fraction of the outline that matches.
+/// Measured on renderings: 0.05 loses completeness.
+const RIM_WEIGHT: f64 = 0.1;
 
-/// Fills the `weak` pixels that have no plane of validated origin, and pixels beside them that look alike; gives those it
-/// filled.
-pub fn fill(problem: &Problem, planes: &mut [FoodSource], weak: &[bool]) -> Vec<usize> {
-    let width = problem.image.width;
-    let mut marks = Marks::new(planes.len());
-    let mut is_traced = vec![false; planes.len()];
-    let ends_within = region::end_within(width, weak);
-    let mut filled = Vec::new();
-    let mut parts = 0;
-    for pixel in 0..planes.len() {
-        if is_traced[pixel] || !region::is_open(planes, weak, pixel) {
-            continue;
-        }
-        parts += 1;
-        let mut part = Part::trace(width, planes, weak, pixel, &mut marks);
-        part.core.iter().for_each(|&pixel| is_traced[pixel] = true);
-        if !part.is_framed() {
-            continue;
-        }
-        if ends_within[pixel] {
-            part.grow(problem, planes, &mut marks);
-        }
-        let witness = |pixel: usize| Witness {
-            place: place(pixel, width),
-            inverse_depth: 1.0 / f64::from(planes[pixel].depth),
-        };
-        let witnesses: Vec<Witness> =
-            part.witnesses(planes, width, &mut marks).into_iter().map(witness).collect();
-        let looks = ends_within[pixel]
-            .then(|| Looks::new(problem, &part, part.band(width, planes.len() / width, &mut marks)));
-        let found = common_planes(&witnesses, parts);
-        let look = |plane| looks.as_ref()?.share(problem, plane);
-        let Some(plane) = choose(&found, part.framed(), look) else {
-            continue;
-        };
-        for &pixel in part.core.iter().chain(&part.grown) {
-            if let Some(found) = on_plane(problem, plane, place(pixel, width)) {
-                planes[pixel] = FoodSource { cost: planes[pixel].cost, ..found };
-                filled.push(pixel);
+/// Fills each textureless region with the plane of its surroundings that the source views confirm.
+pub struct FillTextureless<'a> {
+    /// The view, as in the call, and its source views.
+    pub problem: &'a Problem<'a>,
+    /// Whether the window around a pixel varies no more than noise, for every pixel.
+    pub is_textureless: &'a [bool],
+}
+
+impl Filter for FillTextureless<'_> {
+    fn reach(&self) -> Option<usize> {
+        None
+    }
+
+    /// A region grows also over validated pixels: their windows may have matched by what is beside the
+    /// region.
+    fn domain(&self) -> Domain {
+        Domain::All
+    }
+
+    fn apply(&self, view: &FilteredView, planes: &mut [PixelEstimate]) -> Vec<u32> {
+        let grid = view.grid();
+        let mut scratch = PixelSet::new(grid.pixels());
+        let is_enclosed = region::find_enclosed(grid, self.is_textureless);
+        let mut is_traced = vec![false; grid.pixels()];
+        let mut filled = Vec::new();
+        let mut regions = 0;
+        for pixel in 0..grid.pixels() {
+            if is_traced[pixel] || !region::is_open(planes, self.is_textureless, pixel) {
+                continue;
+            }
+            regions += 1;
+            let mut region = Region::trace(grid, planes, self.is_textureless, pixel, &mut scratch);
+            region.core.iter().for_each(|&pixel| is_traced[pixel] = true);
+            if !region.outline.is_surrounded(region.core.len()) {
+                continue;
+            }
+            if is_enclosed[pixel] {
+                region.grow(view.image, planes, &mut scratch);
+            }
+            let rim = rim_samples(grid, &region.rim(planes, &mut scratch), planes);
+            let photo_check = is_enclosed[pixel].then(|| {
+                let band = region.outline_band(&mut scratch);
+                PhotoCheck::new(view.image, &region.core, &band)
+            });
+            let candidates = fit_rim_planes(&rim, regions);
+            let matching = |plane| photo_check.as_ref()?.matching_fraction(self.problem, plane);
+            if let Some(plane) = best_plane(&candidates, region.outline.surface_fraction(), matching) {
+                filled.extend(self.fill(view, &region, plane, planes));
             }
         }
+        // Regions may grow over the same pixels.
+        filled.sort_unstable();
+        filled.dedup();
+        filled
     }
-    filled
 }
 
-fn place(pixel: usize, width: usize) -> DVec3 {
-    DVec3::new((pixel % width) as f64, (pixel / width) as f64, 1.0)
-}
+impl FillTextureless<'_> {
+    /// Gives a plane to the pixels of a region where it is usable, and returns those.
+    fn fill(
+        &self,
+        view: &FilteredView,
+        region: &Region,
+        plane: DVec3,
+        planes: &mut [PixelEstimate],
+    ) -> Vec<u32> {
+        let mut filled = Vec::new();
+        for pixel in region.pixels() {
+            if let Some(PlaneHypothesis { depth, normal }) = self.plane_at(view, plane, pixel) {
+                planes[pixel] = PixelEstimate { depth, normal, validated: true, ..planes[pixel] };
+                filled.push(pixel as u32);
+            }
+        }
+        filled
+    }
 
-/// The plane by which the part looks best; `framed` is the share of its outline that is not the border of the image.
-fn choose(planes: &[RimPlane], framed: f64, looks: impl Fn(DVec3) -> Option<f64>) -> Option<DVec3> {
-    let worth = |&RimPlane { plane, share }: &RimPlane| {
-        let (looks, min_share) = match looks(plane) {
-            Some(looks) => (looks, MIN_SHARE_SEEN),
-            None => (MIN_LOOKS, MIN_SHARE_UNSEEN),
+    /// A plane, as coefficients of inverse depth, at a pixel; `None` where it is not usable.
+    fn plane_at(&self, view: &FilteredView, plane: DVec3, pixel: usize) -> Option<PlaneHypothesis> {
+        let place = homogeneous(view.grid(), pixel);
+        let ray = self.problem.ray(place.x as f32, place.y as f32);
+        let slanted = SlantedPlane {
+            inverse_depth: plane.dot(place) as f32,
+            slope_x: plane.x as f32,
+            slope_y: plane.y as f32,
         };
-        let is_likely = share * framed >= min_share && looks >= MIN_LOOKS;
-        is_likely.then_some((looks + WORTH_OF_SHARE * share, plane))
-    };
-    let best = planes.iter().filter_map(worth).max_by(|one, other| one.0.total_cmp(&other.0));
-    best.map(|(_, plane)| plane)
+        let (depth, normal) = slanted.depth_and_normal(ray, self.problem.inverse_focal);
+        let hypothesis = PlaneHypothesis { depth, normal };
+        hypothesis.is_usable(ray, &view.range.into()).then_some(hypothesis)
+    }
 }
 
-/// The plane, as inverse depth over column, row and 1, at a pixel, unless it leaves the depth range or turns away there.
-fn on_plane(problem: &Problem, plane: DVec3, place: DVec3) -> Option<FoodSource> {
-    let about = SlantedPlane {
-        inverse_depth: plane.dot(place) as f32,
-        slope_x: plane.x as f32,
-        slope_y: plane.y as f32,
+/// `[x y 1]` of a pixel: the inverse depth of a plane there is the scalar product with the plane's
+/// coefficients.
+fn homogeneous(grid: Grid, pixel: usize) -> DVec3 {
+    let (x, y) = grid.position(pixel);
+    DVec3::new(x as f64, y as f64, 1.0)
+}
+
+fn rim_samples(grid: Grid, rim: &[usize], planes: &[PixelEstimate]) -> Vec<RimSample> {
+    let sample = |&pixel: &usize| RimSample {
+        place: homogeneous(grid, pixel),
+        inverse_depth: 1.0 / f64::from(planes[pixel].depth),
     };
-    let found = FoodSource::of_plane(problem, problem.ray(place.x as f32, place.y as f32), &about)?;
-    Some(FoodSource { validated: true, ..found })
+    rim.iter().map(sample).collect()
+}
+
+/// The plausible plane with the best score; `surface_fraction` is that of the region's outline, `matching`
+/// the result of the photo check, `None` where there is none.
+fn best_plane(
+    candidates: &[RimPlane],
+    surface_fraction: f64,
+    matching: impl Fn(DVec3) -> Option<f64>,
+) -> Option<DVec3> {
+    let mut best: Option<(f64, DVec3)> = None;
+    for &RimPlane { plane, inlier_fraction } in candidates {
+        let (matching, min_rim) = match matching(plane) {
+            Some(matching) => (matching, MIN_RIM_CONFIRMED),
+            None => (MIN_MATCHING, MIN_RIM_UNCHECKED),
+        };
+        // As if the rim went on along the border of the image, but nowhere on the plane.
+        let is_plausible = inlier_fraction * surface_fraction >= min_rim && matching >= MIN_MATCHING;
+        let score = matching + RIM_WEIGHT * inlier_fraction;
+        // Of equal scores the last one wins.
+        if is_plausible && best.is_none_or(|(best, _)| score.total_cmp(&best).is_ge()) {
+            best = Some((score, plane));
+        }
+    }
+    best.map(|(_, plane)| plane)
 }

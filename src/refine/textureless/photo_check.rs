@@ -1,68 +1,91 @@
-//! What a part without texture looks like in the source views. Inside it any plane fits, but by a wrong one its outline
-//! falls somewhere else.
+//! Photometric check of a plane for a textureless region: inside the region any plane matches, but through a
+//! wrong one the outline falls on something else in the source views.
 
-use super::place;
-use super::region::Part;
-use crate::image::{blurred, deviation};
+use super::homogeneous;
+use crate::geometry::Grid;
+use crate::image::{PackedImage, blurred, deviation};
 use crate::matching::{Problem, Source};
 use glam::DVec3;
 
-/// Difference of blurred gray values up to which a pixel looks the same, in deviations of the noise and gray values.
-const SAME: (f32, f32) = (1.2, 0.5);
-/// Source views that must see the part.
+/// Largest difference of blurred gray values that matches, in deviations of the view's noise: two and a half
+/// times 0.47, the deviation of a difference of two 3 x 3 means.
+const MAX_DIFFERENCE_NOISE: f32 = 1.2;
+/// Allowance on top of it, in gray values: rounding and small changes of brightness.
+const MAX_DIFFERENCE_OFFSET: f32 = 0.5;
+/// Fewest source views that must see the region: one alone may match by chance.
 const MIN_VIEWS: usize = 2;
-/// Pixels inside by which views are brought to the same brightness.
-const INNER_PIXELS: usize = 200;
+/// Most samples inside the region, whose median difference is that of the brightness of two views: enough for
+/// a median.
+const INNER_SAMPLES: usize = 200;
+/// Radius in pixels of the box blur against noise: 3 x 3 pixels.
+const BLUR_RADIUS: usize = 1;
 
-/// Pixels of a part with their blurred gray values.
-pub struct Looks {
+/// Samples of a region with their blurred gray values.
+pub struct PhotoCheck {
     /// Along its outline.
-    band: Vec<(DVec3, f32)>,
-    /// Within it.
-    inner: Vec<(DVec3, f32)>,
-    tolerance: f32,
+    band: Vec<GraySample>,
+    /// Inside it.
+    inner: Vec<GraySample>,
+    max_difference: f32,
 }
 
-impl Looks {
-    pub fn new(problem: &Problem, part: &Part, band: Vec<usize>) -> Looks {
-        let look = |pixel: usize| (place(pixel, problem.image.width), blurred(problem.image, pixel, 1));
-        let every = part.core.len().div_ceil(INNER_PIXELS);
-        Looks {
-            band: band.into_iter().map(look).collect(),
-            inner: part.core.iter().copied().step_by(every).map(look).collect(),
-            tolerance: SAME.0 * deviation(problem.image, part.core[0]) + SAME.1,
+struct GraySample {
+    place: DVec3,
+    gray: f32,
+}
+
+impl PhotoCheck {
+    /// The samples of a region's core and of the band along its outline.
+    pub fn new(image: &PackedImage, core: &[usize], band: &[usize]) -> PhotoCheck {
+        let grid = Grid { width: image.width, height: image.height };
+        let sample = |&pixel: &usize| GraySample {
+            place: homogeneous(grid, pixel),
+            gray: blurred(image, pixel, BLUR_RADIUS),
+        };
+        let step = core.len().div_ceil(INNER_SAMPLES);
+        PhotoCheck {
+            band: band.iter().map(sample).collect(),
+            inner: core.iter().step_by(step).map(sample).collect(),
+            max_difference: MAX_DIFFERENCE_NOISE * deviation(image, core[0]) + MAX_DIFFERENCE_OFFSET,
         }
     }
 
-    /// Share of the band that looks the same in the source views if the part lies on this plane: the mean of the better
-    /// half of the views, since something may hide it from the others. `None` where too few views see it.
-    pub fn share(&self, problem: &Problem, plane: DVec3) -> Option<f64> {
-        let mut shares: Vec<f64> =
-            problem.sources.iter().filter_map(|source| self.share_in(source, plane)).collect();
-        if shares.len() < MIN_VIEWS {
+    /// Fraction of the band that matches in the source views through a plane: the mean of the better half of
+    /// the views, as the region may be occluded in the others. `None` where too few views see it.
+    pub fn matching_fraction(&self, problem: &Problem, plane: DVec3) -> Option<f64> {
+        let mut fractions: Vec<f64> =
+            problem.sources.iter().filter_map(|source| self.matching_fraction_in(source, plane)).collect();
+        if fractions.len() < MIN_VIEWS {
             return None;
         }
-        shares.sort_unstable_by(|one, other| other.total_cmp(one));
-        let better = &shares[..shares.len().div_ceil(2)];
+        fractions.sort_unstable_by(|one, other| other.total_cmp(one));
+        let better = &fractions[..fractions.len().div_ceil(2)];
         Some(better.iter().sum::<f64>() / better.len() as f64)
     }
 
-    fn share_in(&self, source: &Source, plane: DVec3) -> Option<f64> {
-        let difference = |&(place, gray): &(DVec3, f32)| {
-            let inverse_depth = Some(plane.dot(place) as f32).filter(|&inverse_depth| inverse_depth > 0.0)?;
-            let at_infinity = source.pose.at_infinity(place.x as f32, place.y as f32);
-            let at = source.project(at_infinity + source.pose.epipole * inverse_depth)?;
-            let nearest = (at.y + 0.5) as usize * source.image.width + (at.x + 0.5) as usize;
-            Some(blurred(source.image, nearest, 1) - gray)
-        };
+    fn matching_fraction_in(&self, source: &Source, plane: DVec3) -> Option<f64> {
+        let difference = |sample: &GraySample| sample.difference(source, plane);
         let mut inner: Vec<f32> = self.inner.iter().filter_map(difference).collect();
         let band: Vec<f32> = self.band.iter().filter_map(difference).collect();
         if inner.is_empty() || 2 * band.len() < self.band.len().max(1) {
             return None;
         }
         let middle = inner.len() / 2;
-        let brighter = *inner.select_nth_unstable_by(middle, f32::total_cmp).1;
-        let same = band.iter().filter(|&&difference| (difference - brighter).abs() < self.tolerance).count();
-        Some(same as f64 / band.len() as f64)
+        let brightness = *inner.select_nth_unstable_by(middle, f32::total_cmp).1;
+        let matches = |&&difference: &&f32| (difference - brightness).abs() < self.max_difference;
+        Some(band.iter().filter(matches).count() as f64 / band.len() as f64)
+    }
+}
+
+impl GraySample {
+    /// Blurred gray value in a source view through a plane, less that in the view; `None` outside the source
+    /// view.
+    fn difference(&self, source: &Source, plane: DVec3) -> Option<f32> {
+        let inverse_depth =
+            Some(plane.dot(self.place) as f32).filter(|&inverse_depth| inverse_depth > 0.0)?;
+        let at_infinity = source.pose.at_infinity(self.place.x as f32, self.place.y as f32);
+        let projection = source.project(at_infinity + source.pose.epipole * inverse_depth)?;
+        let nearest = (projection.y + 0.5) as usize * source.image.width + (projection.x + 0.5) as usize;
+        Some(blurred(source.image, nearest, BLUR_RADIUS) - self.gray)
     }
 }

@@ -1,174 +1,195 @@
-//! The connected parts without texture, and what lies around them.
+//! Connected textureless regions, their outlines, and the pixels around them.
 
-use crate::ambc::FoodSource;
-use crate::image::{blurred, deviation};
-use crate::matching::Problem;
+use crate::geometry::Grid;
+use crate::image::{PackedImage, blurred, deviation};
+use crate::scene::PixelEstimate;
 
-/// Width of the rim around a grown part, in pixels.
-const RIM: usize = 3;
-/// Share of the outline that must not be the border of the image.
-const MIN_FRAMED: f64 = 0.6;
-/// Sides of pixels with a surface beyond, by the square root of the part's area, that an outline has at least: a disc's
-/// has some 4.5 of them.
-const MIN_FRAME: f64 = 1.5;
-/// Sides of pixels at the border of the image, by the square root of the area, that weak pixels have at most that do not go
-/// on beyond it: half a disc has some 1.6 of them, a strip of sky many more.
-const MAX_BORDER: f64 = 2.0;
-/// How far a part grows, in pixels: windows that reach over its outline are no weak ones.
-const REACH: usize = 6;
-/// Difference of blurred gray values up to which a part grows, in deviations of the noise and gray values.
-const ALIKE: (f32, f32) = (0.8, 0.5);
-/// Width of the band along the outline, and pixels of it that are looked at.
-const BAND: usize = 4;
-const BAND_PIXELS: usize = 400;
+/// Width in pixels of the rim of validated pixels around a grown region: enough samples for planes, near
+/// enough to be of the adjacent surfaces.
+const RIM_WIDTH: usize = 3;
+/// Fraction of the outline that must not be border of the image: less says too little about the region's
+/// surface.
+const MIN_SURFACE_FRACTION: f64 = 0.6;
+/// Fewest sides of pixels with a surface beyond, over the square root of the region's area in pixels: a third
+/// of a disc's outline, which has about 4.5.
+const MIN_SURFACE_SIDES: f64 = 1.5;
+/// Most sides of pixels at the border of the image, over the square root of the area, of a region that ends
+/// within the image: half a disc has about 1.6, a strip of sky many more.
+const MAX_BORDER_SIDES: f64 = 2.0;
+/// Pixels by which a region grows at most: windows that reach over its outline are not textureless.
+const MAX_GROWTH: usize = 6;
+/// Largest difference of blurred gray values to a pixel that a region grows over, in deviations of the noise:
+/// two deviations of a difference of a 3 x 3 and a 5 x 5 mean, 0.39 each.
+const MAX_DIFFERENCE_NOISE: f32 = 0.8;
+/// Allowance on top of it, in gray values: rounding.
+const MAX_DIFFERENCE_OFFSET: f32 = 0.5;
+/// Radius in pixels of the box blur against noise of the region's pixels, and of those it may grow over:
+/// small, to not blur over the outline.
+const CORE_BLUR_RADIUS: usize = 2;
+const GROWTH_BLUR_RADIUS: usize = 1;
+/// Width in pixels of the band along the inside of the outline that the photo check samples: the errors of a
+/// wrong plane move the outline by a few pixels.
+const BAND_WIDTH: usize = 4;
+/// Most samples of the band; more do not change the fraction that matches much.
+const BAND_SAMPLES: usize = 400;
 
-/// Sets of pixels that share their memory.
-pub struct Marks {
-    of: Vec<u32>,
-    now: u32,
+/// A set of pixels. Emptying it is free of charge, so that one set serves all regions.
+pub struct PixelSet {
+    /// The generation in which a pixel was last inserted.
+    inserted: Vec<u32>,
+    generation: u32,
 }
 
-impl Marks {
-    pub fn new(pixels: usize) -> Marks {
-        Marks { of: vec![0; pixels], now: 0 }
+impl PixelSet {
+    /// An empty set of pixels of an image with this many.
+    pub fn new(pixels: usize) -> PixelSet {
+        PixelSet { inserted: vec![0; pixels], generation: 1 }
     }
 
-    /// Starts again with these pixels.
-    fn start<'a>(&mut self, pixels: impl IntoIterator<Item = &'a usize>) {
-        if self.now == u32::MAX {
-            (self.now, self.of) = (0, vec![0; self.of.len()]);
+    /// Replaces its pixels.
+    fn reset<'a>(&mut self, pixels: impl IntoIterator<Item = &'a usize>) {
+        if self.generation == u32::MAX {
+            *self = PixelSet::new(self.inserted.len());
         }
-        self.now += 1;
-        pixels.into_iter().for_each(|&pixel| self.of[pixel] = self.now);
+        self.generation += 1;
+        pixels.into_iter().for_each(|&pixel| self.inserted[pixel] = self.generation);
     }
 
-    fn has(&self, pixel: usize) -> bool {
-        self.of[pixel] == self.now
+    fn contains(&self, pixel: usize) -> bool {
+        self.inserted[pixel] == self.generation
     }
 
-    /// Whether the pixel was not there before.
-    fn add(&mut self, pixel: usize) -> bool {
-        let is_new = !self.has(pixel);
-        self.of[pixel] = self.now;
-        is_new
+    /// Returns whether the pixel is new to it.
+    fn insert(&mut self, pixel: usize) -> bool {
+        std::mem::replace(&mut self.inserted[pixel], self.generation) != self.generation
     }
 }
 
-/// A connected part of the image that shows nothing but noise.
-pub struct Part {
-    /// Its pixels.
+/// The sides of a region's pixels that are its outline.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Outline {
+    /// Those with a validated pixel beyond.
+    surface_sides: usize,
+    /// Those at the border of the image.
+    border_sides: usize,
+}
+
+impl Outline {
+    /// Fraction of the outline with a surface beyond.
+    pub fn surface_fraction(self) -> f64 {
+        self.surface_sides as f64 / (self.surface_sides + self.border_sides).max(1) as f64
+    }
+
+    /// Whether enough of the outline of a region with this area in pixels has a surface beyond.
+    pub fn is_surrounded(self, area: usize) -> bool {
+        let min_sides = MIN_SURFACE_SIDES * (area as f64).sqrt();
+        self.surface_sides as f64 >= min_sides && self.surface_fraction() >= MIN_SURFACE_FRACTION
+    }
+}
+
+/// A connected region of open pixels.
+pub struct Region {
+    grid: Grid,
+    /// Its pixels; the first one first, the others by their distance from it.
     pub core: Vec<usize>,
-    /// The pixels around them that look alike.
-    pub grown: Vec<usize>,
-    /// Sides of its pixels with a surface beyond, and those at the border of the image.
-    outline: (usize, usize),
+    /// The pixels that it has grown over.
+    grown: Vec<usize>,
+    /// The outline of its core.
+    pub outline: Outline,
 }
 
-pub fn is_open(planes: &[FoodSource], weak: &[bool], pixel: usize) -> bool {
-    weak[pixel] && !planes[pixel].validated && planes[pixel].depth > 0.0
+/// Whether a pixel is textureless and has a plane that is not validated.
+pub fn is_open(planes: &[PixelEstimate], is_textureless: &[bool], pixel: usize) -> bool {
+    is_textureless[pixel] && !planes[pixel].validated && planes[pixel].depth > 0.0
 }
 
-/// The four neighbors of a pixel, `None` outside the image.
-fn neighbors(pixel: usize, width: usize, height: usize) -> [Option<usize>; 4] {
-    let (x, y) = (pixel % width, pixel / width);
-    [
-        (x > 0).then(|| pixel - 1),
-        (x + 1 < width).then(|| pixel + 1),
-        (y > 0).then(|| pixel - width),
-        (y + 1 < height).then(|| pixel + width),
-    ]
-}
-
-/// Of every weak pixel whether the weak pixels connected with it end within the image; what goes on beyond it may be a
-/// sky, and what frames a sky lies before it.
-pub fn end_within(width: usize, weak: &[bool]) -> Vec<bool> {
-    let height = weak.len() / width;
-    let mut ends = vec![false; weak.len()];
-    let mut is_traced = vec![false; weak.len()];
-    for first in 0..weak.len() {
-        if !weak[first] || std::mem::replace(&mut is_traced[first], true) {
+/// Whether each textureless pixel is connected to textureless pixels that end within the image. Those that
+/// continue beyond its border may be a sky, and what surrounds a sky is in front of it.
+pub fn find_enclosed(grid: Grid, is_textureless: &[bool]) -> Vec<bool> {
+    let mut is_enclosed = vec![false; is_textureless.len()];
+    let mut is_traced = vec![false; is_textureless.len()];
+    for first in 0..is_textureless.len() {
+        if !is_textureless[first] || std::mem::replace(&mut is_traced[first], true) {
             continue;
         }
         let mut connected = vec![first];
-        let (mut border, mut next) = (0, 0);
+        let (mut border_sides, mut next) = (0, 0);
         while next < connected.len() {
-            for neighbor in neighbors(connected[next], width, height) {
+            for neighbor in grid.four_neighbors(connected[next]) {
                 match neighbor {
-                    Some(other) if weak[other] && !std::mem::replace(&mut is_traced[other], true) => {
+                    Some(other)
+                        if is_textureless[other] && !std::mem::replace(&mut is_traced[other], true) =>
+                    {
                         connected.push(other);
                     }
                     Some(_) => {}
-                    None => border += 1,
+                    None => border_sides += 1,
                 }
             }
             next += 1;
         }
-        let is_within = f64::from(border) <= MAX_BORDER * (connected.len() as f64).sqrt();
-        connected.into_iter().for_each(|pixel| ends[pixel] = is_within);
+        let is_within = f64::from(border_sides) <= MAX_BORDER_SIDES * (connected.len() as f64).sqrt();
+        connected.into_iter().for_each(|pixel| is_enclosed[pixel] = is_within);
     }
-    ends
+    is_enclosed
 }
 
-impl Part {
-    /// The open pixels connected with the first one.
+impl Region {
+    /// The open pixels that are connected to an open one.
     pub fn trace(
-        width: usize,
-        planes: &[FoodSource],
-        weak: &[bool],
+        grid: Grid,
+        planes: &[PixelEstimate],
+        is_textureless: &[bool],
         first: usize,
-        marks: &mut Marks,
-    ) -> Part {
-        let height = planes.len() / width;
+        scratch: &mut PixelSet,
+    ) -> Region {
         let mut core = vec![first];
-        marks.start(&core);
-        let mut outline = (0, 0);
+        scratch.reset(&core);
+        let mut outline = Outline::default();
         let mut next = 0;
         while next < core.len() {
-            for neighbor in neighbors(core[next], width, height) {
+            for neighbor in grid.four_neighbors(core[next]) {
                 match neighbor {
-                    Some(neighbor) if is_open(planes, weak, neighbor) => {
-                        if marks.add(neighbor) {
+                    Some(neighbor) if is_open(planes, is_textureless, neighbor) => {
+                        if scratch.insert(neighbor) {
                             core.push(neighbor);
                         }
                     }
-                    // Pixels without a surface say nothing.
-                    Some(neighbor) => outline.0 += usize::from(planes[neighbor].validated),
-                    None => outline.1 += 1,
+                    // Beyond a side without a surface may be anything: it does not count.
+                    Some(neighbor) => outline.surface_sides += usize::from(planes[neighbor].validated),
+                    None => outline.border_sides += 1,
                 }
             }
             next += 1;
         }
-        Part { core, grown: Vec::new(), outline }
+        Region { grid, core, grown: Vec::new(), outline }
     }
 
-    /// Share of the outline that is not the border of the image.
-    pub fn framed(&self) -> f64 {
-        self.outline.0 as f64 / (self.outline.0 + self.outline.1).max(1) as f64
+    /// All of its pixels.
+    pub fn pixels(&self) -> impl Iterator<Item = usize> + '_ {
+        self.core.iter().chain(&self.grown).copied()
     }
 
-    /// Whether there are surfaces around enough of it.
-    pub fn is_framed(&self) -> bool {
-        let frame = MIN_FRAME * (self.core.len() as f64).sqrt();
-        self.outline.0 as f64 >= frame && self.framed() >= MIN_FRAMED
-    }
-
-    /// Takes in the pixels around that look alike: their windows reach beyond the outline and match by what is there.
-    pub fn grow(&mut self, problem: &Problem, planes: &[FoodSource], marks: &mut Marks) {
-        let (width, height) = (problem.image.width, problem.image.height);
-        marks.start(&self.core);
-        let around = |pixel| neighbors(pixel, width, height).into_iter().flatten();
+    /// Adds the adjacent pixels with similar gray values: their windows reach over the outline and have
+    /// matched by what is beyond.
+    pub fn grow(&mut self, image: &PackedImage, planes: &[PixelEstimate], scratch: &mut PixelSet) {
+        let grid = self.grid;
+        let neighbors = |pixel| grid.four_neighbors(pixel).into_iter().flatten();
+        scratch.reset(&self.core);
         let mut front: Vec<(usize, f32)> = (self.core.iter())
-            .filter(|&&pixel| around(pixel).any(|other| !marks.has(other)))
-            .map(|&pixel| (pixel, blurred(problem.image, pixel, 2)))
+            .filter(|&&pixel| neighbors(pixel).any(|other| !scratch.contains(other)))
+            .map(|&pixel| (pixel, blurred(image, pixel, CORE_BLUR_RADIUS)))
             .collect();
-        for _ in 0..REACH {
+        for _ in 0..MAX_GROWTH {
             let mut next = Vec::new();
             for (pixel, gray) in front {
-                for other in around(pixel).filter(|&other| planes[other].depth > 0.0) {
-                    let noise = deviation(problem.image, other);
-                    let difference = (blurred(problem.image, other, 1) - gray).abs();
-                    let is_alike = noise > 0.0 && difference < ALIKE.0 * noise + ALIKE.1;
-                    if is_alike && marks.add(other) {
+                for other in neighbors(pixel).filter(|&other| planes[other].depth > 0.0) {
+                    // Without an estimate of the noise there is no threshold for similar gray values.
+                    let noise = deviation(image, other);
+                    let difference = (blurred(image, other, GROWTH_BLUR_RADIUS) - gray).abs();
+                    let is_similar =
+                        noise > 0.0 && difference < MAX_DIFFERENCE_NOISE * noise + MAX_DIFFERENCE_OFFSET;
+                    if is_similar && scratch.insert(other) {
                         self.grown.push(other);
                         next.push((other, gray));
                     }
@@ -178,42 +199,40 @@ impl Part {
         }
     }
 
-    /// The validated pixels among the grown ones and around them.
-    pub fn witnesses(&self, planes: &[FoodSource], width: usize, marks: &mut Marks) -> Vec<usize> {
-        let height = planes.len() / width;
-        let all = || self.core.iter().chain(&self.grown);
-        marks.start(all());
-        let mut witnesses: Vec<usize> =
+    /// The validated pixels among the grown ones and in the rim around all.
+    pub fn rim(&self, planes: &[PixelEstimate], scratch: &mut PixelSet) -> Vec<usize> {
+        let mut front: Vec<usize> = self.pixels().collect();
+        scratch.reset(&front);
+        let mut rim: Vec<usize> =
             self.grown.iter().copied().filter(|&pixel| planes[pixel].validated).collect();
-        let mut front: Vec<usize> = all().copied().collect();
-        for _ in 0..RIM {
+        for _ in 0..RIM_WIDTH {
             let mut next = Vec::new();
-            for neighbor in front.iter().flat_map(|&pixel| neighbors(pixel, width, height)).flatten() {
-                if planes[neighbor].validated && marks.add(neighbor) {
+            for neighbor in front.iter().flat_map(|&pixel| self.grid.four_neighbors(pixel)).flatten() {
+                if planes[neighbor].validated && scratch.insert(neighbor) {
                     next.push(neighbor);
                 }
             }
-            witnesses.extend(&next);
+            rim.extend(&next);
             front = next;
         }
-        witnesses
+        rim
     }
 
-    /// Pixels inside along the outline of the grown part.
-    pub fn band(&self, width: usize, height: usize, marks: &mut Marks) -> Vec<usize> {
-        let mut inside: Vec<usize> = self.core.iter().chain(&self.grown).copied().collect();
+    /// Samples of its pixels along its outline.
+    pub fn outline_band(&self, scratch: &mut PixelSet) -> Vec<usize> {
+        let mut inside: Vec<usize> = self.pixels().collect();
         let mut band = Vec::new();
-        for _ in 0..BAND {
-            marks.start(&inside);
-            let is_within = |&pixel: &usize| {
-                neighbors(pixel, width, height).into_iter().flatten().all(|other| marks.has(other))
+        for _ in 0..BAND_WIDTH {
+            scratch.reset(&inside);
+            let is_interior = |&pixel: &usize| {
+                self.grid.four_neighbors(pixel).into_iter().flatten().all(|other| scratch.contains(other))
             };
-            let (within, outer) = inside.into_iter().partition::<Vec<usize>, _>(is_within);
+            let (interior, outer) = inside.into_iter().partition::<Vec<usize>, _>(is_interior);
             band.extend(outer);
-            inside = within;
+            inside = interior;
         }
-        let every = band.len().div_ceil(BAND_PIXELS).max(1);
-        band.into_iter().step_by(every).collect()
+        let step = band.len().div_ceil(BAND_SAMPLES).max(1);
+        band.into_iter().step_by(step).collect()
     }
 }
 
@@ -221,28 +240,43 @@ impl Part {
 mod tests {
     use super::*;
 
-    /// How many of the weak pixels of a picture end within it, and how many there are.
-    fn ending(is_weak: impl Fn(i32, i32) -> bool) -> (usize, usize) {
-        let (width, height) = (80, 60);
-        let weak: Vec<bool> =
-            (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| is_weak(x, y)).collect();
-        let ends = end_within(width as usize, &weak);
-        assert!(ends.iter().zip(&weak).all(|(ends, weak)| *weak || !ends));
-        (ends.iter().filter(|ends| **ends).count(), weak.iter().filter(|weak| **weak).count())
+    const GRID: Grid = Grid { width: 80, height: 60 };
+
+    /// Pixels of a picture.
+    #[derive(Debug, PartialEq)]
+    struct Counts {
+        enclosed: usize,
+        textureless: usize,
+    }
+
+    fn count(is_textureless: impl Fn(i32, i32) -> bool) -> Counts {
+        let at = |pixel| {
+            let (x, y) = GRID.position(pixel);
+            is_textureless(x as i32, y as i32)
+        };
+        let is_textureless: Vec<bool> = (0..GRID.pixels()).map(at).collect();
+        let is_enclosed = find_enclosed(GRID, &is_textureless);
+        assert!(
+            is_enclosed.iter().zip(&is_textureless).all(|(enclosed, textureless)| textureless >= enclosed)
+        );
+        let count = |marks: &[bool]| marks.iter().filter(|&&mark| mark).count();
+        Counts { enclosed: count(&is_enclosed), textureless: count(&is_textureless) }
+    }
+
+    fn is_in_disc((x, y): (i32, i32), center: (i32, i32)) -> bool {
+        (x - center.0).pow(2) + (y - center.1).pow(2) <= 100
     }
 
     #[test]
-    fn what_is_cut_off_by_the_border_ends_within_and_a_sky_goes_on() {
-        let disc = |x: i32, y: i32, at: (i32, i32)| (x - at.0).pow(2) + (y - at.1).pow(2) <= 100;
-        let all = |(ends, weak): (usize, usize)| ends == weak && weak > 0;
-        assert!(all(ending(|x, y| disc(x, y, (40, 30)))));
-        assert!(all(ending(|x, y| disc(x, y, (40, 0)))), "half a disc");
-        assert_eq!(ending(|_, y| y < 20).0, 0, "a sky");
-        assert_eq!(ending(|x, y| x + 4 * y < 40).0, 0, "a corner of the sky");
-        assert_eq!(ending(|_, _| true).0, 0);
-        assert_eq!(ending(|_, _| false), (0, 0));
-        // Each by itself.
-        let (ends, weak) = ending(|x, y| y < 20 || disc(x, y, (40, 40)));
-        assert_eq!(weak - ends, 80 * 20);
+    fn discs_cut_by_the_border_are_enclosed_and_a_sky_is_not() {
+        let are_all_enclosed = |Counts { enclosed, textureless }| enclosed == textureless && textureless > 0;
+        assert!(are_all_enclosed(count(|x, y| is_in_disc((x, y), (40, 30)))));
+        assert!(are_all_enclosed(count(|x, y| is_in_disc((x, y), (40, 0)))), "half a disc");
+        assert_eq!(count(|_, y| y < 20).enclosed, 0, "a sky");
+        assert_eq!(count(|x, y| x + 4 * y < 40).enclosed, 0, "a corner of the sky");
+        assert_eq!(count(|_, _| true).enclosed, 0);
+        assert_eq!(count(|_, _| false), Counts { enclosed: 0, textureless: 0 });
+        let both = count(|x, y| y < 20 || is_in_disc((x, y), (40, 40)));
+        assert_eq!(both.textureless - both.enclosed, 80 * 20, "each region has a result of its own");
     }
 }

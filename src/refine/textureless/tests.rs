@@ -1,67 +1,87 @@
-//! What filling promises.
-
+use super::super::contract::assert_contract;
 use super::*;
 use crate::ambc::Random;
 use crate::geometry::Camera;
 use crate::image::{PackedImage, Picture};
-use crate::testing::{self, World};
+use crate::testing::{self, RANGE, World};
 use glam::Vec3;
 
-const SIZE: (u32, u32) = (60, 48);
-const WIDTH: usize = SIZE.0 as usize;
-const PIXELS: usize = WIDTH * SIZE.1 as usize;
+const GRID: Grid = Grid { width: 60, height: 48 };
+const SIZE: (u32, u32) = (GRID.width as u32, GRID.height as u32);
 
-/// The wall seen by one camera; the pixels of a hole have wrong planes that are not validated.
-struct Holed {
+#[test]
+fn keeps_the_contract() {
+    assert_contract(|problem, is_textureless| Box::new(FillTextureless { problem, is_textureless }));
+}
+
+fn view<'a>(world: &'a World) -> FilteredView<'a> {
+    FilteredView { camera: &world.cameras[0], image: &world.images[0], range: RANGE }
+}
+
+/// The wall in a single view; the pixels of a hole are textureless and have wrong planes that are not
+/// validated.
+struct WallWithHole {
     world: World,
-    planes: Vec<FoodSource>,
-    weak: Vec<bool>,
+    planes: Vec<PixelEstimate>,
+    is_textureless: Vec<bool>,
 }
 
-fn holed(is_hole: impl Fn(i32, i32) -> bool) -> Holed {
+fn wall_with_hole(is_hole: impl Fn(i32, i32) -> bool) -> WallWithHole {
     let world = World::new(&[0.0], SIZE);
-    let weak: Vec<bool> = (0..PIXELS).map(|pixel| is_hole(column(pixel), row(pixel))).collect();
-    let plane = |pixel: usize| match weak[pixel] {
-        true => FoodSource { cost: 2.0, ..FoodSource::new(3.0, Vec3::NEG_Z) },
-        false => FoodSource { validated: true, cost: 0.1, ..exact(&world, pixel) },
+    let is_textureless: Vec<bool> =
+        (0..GRID.pixels()).map(|pixel| is_hole(column(pixel), row(pixel))).collect();
+    let plane = |pixel: usize| match is_textureless[pixel] {
+        true => wrong(),
+        false => exact(&world, pixel),
     };
-    Holed { planes: (0..PIXELS).map(plane).collect(), world, weak }
+    WallWithHole { planes: (0..GRID.pixels()).map(plane).collect(), world, is_textureless }
 }
 
-fn exact(world: &World, pixel: usize) -> FoodSource {
-    FoodSource::new(testing::depth(&world.cameras[0], pixel), testing::normal(&world.cameras[0]))
+fn wrong() -> PixelEstimate {
+    PixelEstimate { depth: 3.0, normal: Vec3::NEG_Z, cost: 2.0.into(), ..PixelEstimate::default() }
+}
+
+fn exact(world: &World, pixel: usize) -> PixelEstimate {
+    let camera = &world.cameras[0];
+    PixelEstimate {
+        depth: testing::depth(camera, pixel),
+        normal: testing::normal(camera),
+        cost: 0.1.into(),
+        consistent_views: 0,
+        validated: true,
+    }
 }
 
 fn column(pixel: usize) -> i32 {
-    (pixel % WIDTH) as i32
+    GRID.position(pixel).0 as i32
 }
 
 fn row(pixel: usize) -> i32 {
-    (pixel / WIDTH) as i32
+    GRID.position(pixel).1 as i32
 }
 
 fn is_in_disc(x: i32, y: i32) -> bool {
     (x - 30).pow(2) + (y - 24).pow(2) <= 100
 }
 
-impl Holed {
-    /// Fills, and checks that what is not filled is as it was.
+impl WallWithHole {
+    /// Fills, asserts that only the hole is filled and that costs stay, and returns the filled pixels.
     fn fill(&mut self) -> Vec<usize> {
         let before = self.planes.clone();
-        let mut filled = fill(&self.world.problem(), &mut self.planes, &self.weak);
-        filled.sort_unstable();
+        let problem = self.world.problem();
+        let filter = FillTextureless { problem: &problem, is_textureless: &self.is_textureless };
+        let filled = filter.apply(&view(&self.world), &mut self.planes);
+        let filled: Vec<usize> = filled.into_iter().map(|pixel| pixel as usize).collect();
+        assert!(filled.iter().all(|&pixel| self.is_textureless[pixel] && !before[pixel].validated));
         for (pixel, before) in before.iter().enumerate() {
-            assert_eq!(self.planes[pixel].cost, before.cost, "filling does not match");
-            match filled.binary_search(&pixel) {
-                Ok(_) => assert!(self.weak[pixel] && !before.validated && before.depth > 0.0),
-                Err(_) => assert_eq!(self.planes[pixel], *before),
-            }
+            assert_eq!(self.planes[pixel].cost, before.cost, "filled planes are not matched");
+            assert!(filled.contains(&pixel) || self.planes[pixel] == *before);
         }
         filled
     }
 
     fn hole(&self) -> Vec<usize> {
-        (0..PIXELS).filter(|&pixel| self.weak[pixel]).collect()
+        (0..GRID.pixels()).filter(|&pixel| self.is_textureless[pixel]).collect()
     }
 
     fn assert_on_the_wall(&self, pixels: &[usize]) {
@@ -76,104 +96,112 @@ impl Holed {
 }
 
 #[test]
-fn a_hole_is_filled_with_the_plane_around_it() {
-    let mut holed = holed(is_in_disc);
-    let filled = holed.fill();
-    assert_eq!(filled, holed.hole());
-    holed.assert_on_the_wall(&filled);
+fn a_hole_gets_the_plane_around_it() {
+    let mut wall = wall_with_hole(is_in_disc);
+    let filled = wall.fill();
+    assert_eq!(filled, wall.hole());
+    wall.assert_on_the_wall(&filled);
 }
 
 #[test]
-fn each_part_is_filled_by_itself() {
-    let mut holed = holed(|x, y| (x - 15).pow(2) + (y - 24).pow(2) <= 60 || (41..52).contains(&x) && y > 30);
-    for pixel in (0..PIXELS).filter(|&pixel| column(pixel) > 30) {
-        holed.planes[pixel].depth *= 1.3;
+fn two_holes_get_planes_of_their_own() {
+    let is_hole = |x: i32, y: i32| (x - 15).pow(2) + (y - 24).pow(2) <= 60 || (41..52).contains(&x) && y > 30;
+    let mut wall = wall_with_hole(is_hole);
+    for pixel in (0..GRID.pixels()).filter(|&pixel| column(pixel) > 30) {
+        wall.planes[pixel].depth *= 1.3;
     }
-    let filled = holed.fill();
-    assert_eq!(filled, holed.hole());
-    let left: Vec<usize> = filled.iter().copied().filter(|&pixel| column(pixel) < 30).collect();
-    holed.assert_on_the_wall(&left);
-    let mut right: Vec<usize> = filled.into_iter().filter(|&pixel| column(pixel) > 30).collect();
-    right.retain(|&pixel| (holed.planes[pixel].depth / exact(&holed.world, pixel).depth - 1.3).abs() > 1e-3);
-    assert_eq!(right, []);
+    let filled = wall.fill();
+    assert_eq!(filled, wall.hole());
+    let (left, right): (Vec<usize>, Vec<usize>) = filled.into_iter().partition(|&pixel| column(pixel) < 30);
+    wall.assert_on_the_wall(&left);
+    for pixel in right {
+        let scale = wall.planes[pixel].depth / exact(&wall.world, pixel).depth;
+        assert!((scale - 1.3).abs() <= 1e-3, "{scale} at {pixel}");
+    }
 }
 
 #[test]
-fn something_before_a_third_of_the_rim_does_not_spoil_it() {
-    let mut holed = holed(is_in_disc);
-    for pixel in 0..PIXELS {
+fn another_surface_along_a_third_of_the_rim_changes_nothing() {
+    let mut wall = wall_with_hole(is_in_disc);
+    for pixel in 0..GRID.pixels() {
         let (x, y) = (f64::from(column(pixel) - 30), f64::from(row(pixel) - 24));
-        if !holed.weak[pixel] && x > 0.5 * x.hypot(y) {
-            holed.planes[pixel].depth *= 0.8;
+        if !wall.is_textureless[pixel] && x > 0.5 * x.hypot(y) {
+            wall.planes[pixel].depth *= 0.8;
         }
     }
-    let filled = holed.fill();
-    assert_eq!(filled, holed.hole());
-    holed.assert_on_the_wall(&filled);
+    let filled = wall.fill();
+    assert_eq!(filled, wall.hole());
+    wall.assert_on_the_wall(&filled);
 }
 
 #[test]
-fn a_hole_at_the_border_is_filled_unless_it_is_framed_too_little() {
-    let mut framed = holed(|x, y| (16..45).contains(&x) && y >= 30);
-    let filled = framed.fill();
-    assert_eq!(filled, framed.hole());
-    framed.assert_on_the_wall(&filled);
-    assert_eq!(holed(|_, y| y < 8).fill(), [], "a sky");
-    assert_eq!(holed(|_, y| y >= 12).fill(), []);
-    assert_eq!(holed(|_, _| true).fill(), [], "nothing is around it");
+fn a_hole_at_the_border_is_filled_if_surfaces_surround_enough_of_it() {
+    let mut surrounded = wall_with_hole(|x, y| (16..45).contains(&x) && y >= 30);
+    let filled = surrounded.fill();
+    assert_eq!(filled, surrounded.hole());
+    surrounded.assert_on_the_wall(&filled);
+    assert_eq!(wall_with_hole(|_, y| y < 8).fill(), [], "a sky");
+    assert_eq!(wall_with_hole(|_, y| y >= 12).fill(), []);
+    assert_eq!(wall_with_hole(|_, _| true).fill(), [], "no surface around it");
 }
 
 #[test]
-fn a_hole_whose_rim_lies_on_no_common_plane_stays() {
-    let mut holed = holed(is_in_disc);
-    for pixel in (0..PIXELS).filter(|&pixel| !is_in_disc(column(pixel), row(pixel))) {
+fn a_hole_with_no_common_plane_around_it_stays() {
+    let mut wall = wall_with_hole(is_in_disc);
+    for pixel in (0..GRID.pixels()).filter(|&pixel| !is_in_disc(column(pixel), row(pixel))) {
         let (x, y) = ((column(pixel) - 30) as f32, (row(pixel) - 24) as f32);
-        holed.planes[pixel].depth *= 1.0 + 0.05 * (4.0 * y.atan2(x)).sin();
+        wall.planes[pixel].depth *= 1.0 + 0.05 * (4.0 * y.atan2(x)).sin();
     }
-    assert_eq!(holed.fill(), []);
+    assert_eq!(wall.fill(), []);
 }
 
 #[test]
-fn pixels_that_can_be_matched_are_validated_or_masked_stay() {
-    let mut holed = holed(is_in_disc);
-    let hole = holed.hole();
-    let at = |x: usize, y: usize| y * WIDTH + x;
-    // Not validated, but matched; validated, but weak; left out by a mask.
-    let (matched, validated, masked) = (at(30, 24), at(27, 22), at(33, 26));
-    holed.weak[matched] = false;
-    holed.planes[validated] = FoodSource { validated: true, ..exact(&holed.world, validated) };
-    holed.planes[masked] = FoodSource::new(0.0, Vec3::ZERO);
-    let filled = holed.fill();
-    let rest = hole.into_iter().filter(|pixel| ![matched, validated, masked].contains(pixel));
+fn pixels_with_texture_a_validated_plane_or_none_stay() {
+    let mut wall = wall_with_hole(is_in_disc);
+    let hole = wall.hole();
+    let [textured, validated, masked] = [(30, 24), (27, 22), (33, 26)].map(|position| GRID.index(position));
+    wall.is_textureless[textured] = false;
+    wall.planes[validated] = exact(&wall.world, validated);
+    wall.planes[masked] = PixelEstimate::default();
+    let filled = wall.fill();
+    let rest = hole.into_iter().filter(|pixel| ![textured, validated, masked].contains(pixel));
     assert_eq!(filled, rest.collect::<Vec<_>>());
-    holed.assert_on_the_wall(&filled);
-    holed.weak.fill(false);
-    filled.iter().for_each(|&pixel| holed.planes[pixel].validated = false);
-    assert_eq!(holed.fill(), []);
+    wall.assert_on_the_wall(&filled);
+    wall.is_textureless.fill(false);
+    filled.iter().for_each(|&pixel| wall.planes[pixel].validated = false);
+    assert_eq!(wall.fill(), []);
 }
 
 #[test]
-fn a_pixel_whose_plane_leaves_the_depth_range_stays() {
-    let mut holed = holed(is_in_disc);
-    let depths = holed.hole().into_iter().map(|pixel| exact(&holed.world, pixel).depth);
+fn pixels_whose_plane_leaves_the_depth_range_stay() {
+    let mut wall = wall_with_hole(is_in_disc);
+    let depths = wall.hole().into_iter().map(|pixel| exact(&wall.world, pixel).depth);
     let far = depths.clone().fold(0.0, f32::max) - 0.1;
     let count = depths.filter(|&depth| depth <= far).count();
-    let mut problem = holed.world.problem();
-    problem.range.far = far;
-    let filled = fill(&problem, &mut holed.planes, &holed.weak);
-    assert!(filled.len() < holed.hole().len() && filled.len().abs_diff(count) <= 1);
-    assert!(filled.iter().all(|&pixel| holed.planes[pixel].depth <= far));
+    let mut view = view(&wall.world);
+    view.range.far = f64::from(far);
+    let problem = wall.world.problem();
+    let filter = FillTextureless { problem: &problem, is_textureless: &wall.is_textureless };
+    let filled = filter.apply(&view, &mut wall.planes);
+    assert!(filled.len() < wall.hole().len() && filled.len().abs_diff(count) <= 1);
+    assert!(filled.iter().all(|&pixel| wall.planes[pixel as usize].depth <= far));
 }
 
-/// A bright panel that shows nothing but noise, well before the wall and parallel to the first image.
+/// A bright textureless panel with noise, in front of the wall and parallel to the first image.
 const PANEL_DEPTH: f64 = 2.5;
-const PANEL_SIZE: (u32, u32) = (128, 96);
+const PANEL_GRID: Grid = Grid { width: 128, height: 96 };
+const PANEL_SIZE: (u32, u32) = (PANEL_GRID.width as u32, PANEL_GRID.height as u32);
 
 fn is_on_panel(x: f64, y: f64) -> bool {
     (x - 64.0).abs() < 36.0 && (y - 48.0).abs() < 28.0
 }
 
-/// The gray value of the panel or the wall behind it at a pixel.
+/// Whether the window around a pixel is within the panel.
+fn is_inside_panel(x: f64, y: f64) -> bool {
+    is_on_panel(1.2 * x - 12.8, 1.25 * y - 12.0)
+}
+
+/// Gray value of the panel, or of the wall behind it, at a pixel.
 fn panel_gray(first: &Camera, camera: &Camera, pixel: usize) -> f32 {
     let center = camera.unproject(testing::place(camera, pixel), 0.0);
     let on_wall = camera.unproject(testing::place(camera, pixel), f64::from(testing::depth(camera, pixel)));
@@ -184,9 +212,10 @@ fn panel_gray(first: &Camera, camera: &Camera, pixel: usize) -> f32 {
     }
 }
 
-/// The panel before the wall, in these views; its outermost pixels are validated, by what their windows show of the wall,
-/// as the wall on three sides and as the panel on the fourth.
-fn fill_panel(places: &[f64]) -> Vec<FoodSource> {
+/// The panel in front of the wall, seen from these places. Its outermost pixels have validated planes, as
+/// their windows match by the wall beside them: those of the wall on three sides and those of the panel on
+/// the fourth.
+fn fill_panel(places: &[f64]) -> Vec<PixelEstimate> {
     let mut world = World::new(places, PANEL_SIZE);
     for (view, camera) in world.cameras.iter().enumerate() {
         let noisy = |pixel| {
@@ -197,41 +226,42 @@ fn fill_panel(places: &[f64]) -> Vec<FoodSource> {
         world.images[view] =
             PackedImage::new(&Picture::from_gray(PANEL_SIZE.0, PANEL_SIZE.1, grays).unwrap());
     }
-    let weak = |x: f64, y: f64| is_on_panel(1.2 * x - 12.8, 1.25 * y - 12.0);
-    let (mut planes, mut is_weak) = (Vec::new(), Vec::new());
-    for pixel in 0..world.cameras[0].pixels() {
-        let at = testing::place(&world.cameras[0], pixel);
-        is_weak.push(weak(at.x, at.y));
-        planes.push(match (is_on_panel(at.x, at.y), weak(at.x, at.y), at.y > 70.0) {
-            (true, true, _) => FoodSource { cost: 2.0, ..FoodSource::new(3.0, Vec3::NEG_Z) },
-            (true, false, true) => panel(),
-            _ => FoodSource { validated: true, cost: 0.1, ..exact(&world, pixel) },
+    let (mut planes, mut is_textureless) = (Vec::new(), Vec::new());
+    for pixel in 0..PANEL_GRID.pixels() {
+        let place = testing::place(&world.cameras[0], pixel);
+        let is_inside = is_inside_panel(place.x, place.y);
+        is_textureless.push(is_inside);
+        planes.push(match (is_on_panel(place.x, place.y), is_inside, place.y > 70.0) {
+            (true, true, _) => wrong(),
+            (true, false, true) => {
+                PixelEstimate { depth: PANEL_DEPTH as f32, normal: Vec3::NEG_Z, ..exact(&world, pixel) }
+            }
+            _ => exact(&world, pixel),
         });
     }
-    fill(&world.problem(), &mut planes, &is_weak);
+    let problem = world.problem();
+    let filter = FillTextureless { problem: &problem, is_textureless: &is_textureless };
+    filter.apply(&view(&world), &mut planes);
     planes
 }
 
-fn panel() -> FoodSource {
-    FoodSource { validated: true, cost: 0.1, ..FoodSource::new(PANEL_DEPTH as f32, Vec3::NEG_Z) }
-}
-
-/// Share of the panel that lies on it.
-fn share_on_panel(planes: &[FoodSource]) -> f64 {
-    let width = PANEL_SIZE.0 as usize;
-    let on_panel = |&pixel: &usize| is_on_panel((pixel % width) as f64, (pixel / width) as f64);
-    let all: Vec<usize> = (0..planes.len()).filter(on_panel).collect();
-    let right = |&&pixel: &&usize| {
+/// Fraction of the panel's pixels with the panel's plane.
+fn fraction_on_panel(planes: &[PixelEstimate]) -> f64 {
+    let is_panel = |&pixel: &usize| {
+        let (x, y) = PANEL_GRID.position(pixel);
+        is_on_panel(x as f64, y as f64)
+    };
+    let pixels: Vec<usize> = (0..planes.len()).filter(is_panel).collect();
+    let is_right = |&&pixel: &&usize| {
         (f64::from(planes[pixel].depth) / PANEL_DEPTH - 1.0).abs() < 2e-3 && planes[pixel].validated
     };
-    all.iter().filter(right).count() as f64 / all.len() as f64
+    pixels.iter().filter(is_right).count() as f64 / pixels.len() as f64
 }
 
 #[test]
-fn the_plane_by_which_a_part_looks_the_same_in_the_sources_is_taken_against_most_of_what_is_around() {
-    let found = share_on_panel(&fill_panel(&[0.0, 0.8, -0.8, 1.4, -1.4]));
-    assert!(found > 0.94, "{found} of the panel is filled with its plane");
-    // A view alone has nothing but the surroundings to tell by.
-    let alone = share_on_panel(&fill_panel(&[0.0]));
-    assert!(alone < 0.1, "{alone}");
+fn the_plane_that_matches_in_the_source_views_wins_over_the_most_frequent_one() {
+    let checked = fraction_on_panel(&fill_panel(&[0.0, 0.8, -0.8, 1.4, -1.4]));
+    assert!(checked > 0.94, "{checked} of the panel has its plane");
+    let unchecked = fraction_on_panel(&fill_panel(&[0.0]));
+    assert!(unchecked < 0.1, "{unchecked} without source views, where the most frequent plane wins");
 }

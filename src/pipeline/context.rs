@@ -1,0 +1,193 @@
+//! What all stages of a run share, and nothing changes: options, images of all scales, source lists, the order of the cycles.
+
+use super::cycle::Cycle;
+use super::estimate::{Checked, ViewEstimate};
+use super::progress::{Phase, Progress};
+use super::store::PublishedSurfaces;
+use crate::cross_view::Donor;
+use crate::error::{Error, Result};
+use crate::matching::{Problem, Source, Window};
+use crate::options::Options;
+use crate::parallel::Advance;
+use crate::refine::FilteredView;
+use crate::scene::{PixelEstimate, ScaledView, Scene};
+use crate::simd::SimdLevel;
+use crate::view_selection::{SourceLists, source_lists};
+use rayon::prelude::*;
+
+/// A view in a cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Place {
+    /// Index of the cycle in the run.
+    pub cycle: usize,
+    /// Index of the view in the scene.
+    pub view: usize,
+}
+
+/// What all stages of a run share.
+pub struct RunContext {
+    pub options: Options,
+    pub level: SimdLevel,
+    /// By scale.
+    windows: Vec<Window>,
+    sources: SourceLists,
+    cycles: Vec<Cycle>,
+    /// By scale and view.
+    scaled: Vec<Vec<ScaledView>>,
+}
+
+impl RunContext {
+    /// Reduces the images to all scales and chooses the source views; `advance` is told of 0 units before each image.
+    ///
+    /// # Errors
+    /// An option out of its range, named; what `advance` returns.
+    pub fn new(scene: &Scene, options: &Options, advance: Advance) -> Result<RunContext> {
+        options.check()?;
+        let scales = &options.schedule.scales;
+        let scaled = |scale: &crate::Scale| {
+            let scaled = |view| advance(0).map(|()| ScaledView::of(scene, view, scale.downscale));
+            (0..scene.views().len()).into_par_iter().map(scaled).collect()
+        };
+        Ok(RunContext {
+            options: options.clone(),
+            level: options.simd.unwrap_or_else(SimdLevel::detect),
+            windows: (0..scales.len()).map(|scale| window(options, scale)).collect(),
+            sources: source_lists(scene, options),
+            cycles: Cycle::all(options),
+            scaled: scales.iter().map(scaled).collect::<Result<_>>()?,
+        })
+    }
+
+    /// The cycles in order.
+    pub fn cycles(&self) -> &[Cycle] {
+        &self.cycles
+    }
+
+    /// Number of views.
+    pub fn views(&self) -> usize {
+        self.sources.lists.len()
+    }
+
+    /// The source views of a view, along which its view sets count.
+    pub fn sources(&self, view: usize) -> &[u32] {
+        &self.sources.lists[view]
+    }
+
+    /// What the user should know about the choice of source views, in sentences.
+    pub fn warnings(&self) -> &[String] {
+        &self.sources.warnings
+    }
+
+    /// The window of the patches on the scale of a cycle.
+    pub fn window(&self, cycle: usize) -> &Window {
+        &self.windows[self.cycles[cycle].scale_index]
+    }
+
+    /// A view on the scale of a cycle.
+    pub fn scaled(&self, at: Place) -> &ScaledView {
+        &self.scaled[self.cycles[at.cycle].scale_index][at.view]
+    }
+
+    /// What the filters of a view's planes know of it.
+    pub fn filtered_view(&self, at: Place) -> FilteredView<'_> {
+        let ScaledView { camera, image, range, .. } = self.scaled(at);
+        FilteredView { camera, image, range: *range }
+    }
+
+    /// A view and its sources with their published surfaces.
+    pub fn problem<'b>(&'b self, at: Place, surfaces: PublishedSurfaces<'b>) -> Problem<'b> {
+        let ScaledView { camera, image, range, .. } = self.scaled(at);
+        let mut problem = Problem::new(camera, image, *range);
+        for (&source, surface) in self.sources(at.view).iter().zip(surfaces.0) {
+            let ScaledView { camera: other, image, .. } = self.scaled(Place { view: source as usize, ..at });
+            problem.sources.push(Source::new(camera, other, image, surface));
+        }
+        problem
+    }
+
+    /// The views that have a view among their sources, with their checked planes where these are known.
+    pub fn donors<'b>(
+        &'b self,
+        at: Place,
+        planes: impl Fn(usize) -> Option<&'b [PixelEstimate]>,
+    ) -> Vec<Donor<'b>> {
+        let has_view = |donor: &usize| self.sources(*donor).contains(&(at.view as u32));
+        let donor = |view| {
+            let camera = &self.scaled(Place { view, ..at }).camera;
+            planes(view).map(|planes| Donor { view, camera, planes })
+        };
+        (0..self.views()).filter(has_view).filter_map(donor).collect()
+    }
+
+    /// The cycle after this one; `None` after the last. A scale ends early once fewer pixels of the estimates changed in the
+    /// cycle than the option `schedule.min_changed_fraction` asks for.
+    pub fn next_cycle<'e>(
+        &self,
+        cycle: usize,
+        estimates: impl Iterator<Item = &'e ViewEstimate<Checked>>,
+    ) -> Option<usize> {
+        let (mut changed, mut pixels) = (0, 0);
+        for record in estimates.filter_map(|estimate| estimate.cycles().last()) {
+            changed += record.changed;
+            pixels += record.pixels;
+        }
+        let min_changed = self.options.schedule.min_changed_fraction;
+        let ends_scale =
+            self.cycles[cycle].cycle > 0 && (changed as f64 / pixels.max(1) as f64) < min_changed;
+        let is_next = |&other: &usize| {
+            !(ends_scale && self.cycles[other].scale_index == self.cycles[cycle].scale_index)
+        };
+        (cycle + 1..self.cycles.len()).find(is_next)
+    }
+
+    /// Whether the scale may end with the cycle of an estimate, as far as the estimate alone determines it.
+    pub fn may_end_scale<S>(&self, estimate: &ViewEstimate<S>) -> bool {
+        let scale = |cycle: usize| self.cycles.get(cycle).map(|cycle| cycle.scale_index);
+        let min_changed = self.options.schedule.min_changed_fraction;
+        let cycle = estimate.cycle();
+        scale(cycle + 1) != scale(cycle)
+            || estimate
+                .cycles()
+                .last()
+                .is_some_and(|record| (record.changed as f64) < min_changed * record.pixels as f64)
+    }
+
+    /// Units of work of searching all views in the cycles before this one.
+    pub fn work_before(&self, cycle: usize) -> u64 {
+        let pixels = |scale: usize| self.scaled[scale].iter().map(|view| view.camera.pixels() as u64).sum();
+        self.cycles[..cycle].iter().map(|cycle| cycle.work(pixels(cycle.scale_index))).sum()
+    }
+
+    /// Where the run is in a phase of a view.
+    pub fn progress(&self, phase: Phase, at: Place) -> Progress {
+        let cycle = &self.cycles[at.cycle];
+        let (downscale, views) = (cycle.scale.downscale, self.views());
+        Progress { phase, downscale, cycle: cycle.cycle, view: at.view, views, done: 0.0 }
+    }
+
+    /// Refuses a cycle or view that does not exist.
+    pub fn check_place(&self, at: Place) -> Result<()> {
+        if at.cycle >= self.cycles.len() {
+            let expected = format!("a cycle below their number, {}", self.cycles.len());
+            return Err(Error::argument("cycle", at.cycle, expected));
+        }
+        if at.view >= self.views() {
+            let expected = format!("a view below their number, {}", self.views());
+            return Err(Error::argument("view", at.view, expected));
+        }
+        Ok(())
+    }
+}
+
+/// The window of a scale. At full size after coarser scales the surfaces are known: a smaller window keeps to one of them at
+/// edges.
+fn window(options: &Options, scale: usize) -> Window {
+    let own = &options.window;
+    let is_full_size_after_coarser = scale > 0 && options.schedule.scales[scale].downscale == 1;
+    let (radius, is_circular) = match is_full_size_after_coarser && own.full_size_window_radius > 0 {
+        true => (own.full_size_window_radius, false),
+        false => (own.window_radius, own.circular_window),
+    };
+    let make = if is_circular { Window::disc } else { Window::new };
+    make(radius, own.window_step, own.sigma_spatial, own.sigma_color, own.min_variance)
+}

@@ -1,0 +1,150 @@
+//! What a run keeps of each view between stages, today in memory. Stages take planes and surfaces of other views from here
+//! in named types, by the source list of the view they work on.
+
+use super::estimate::{Checked, ViewEstimate};
+use crate::error::Result;
+use crate::scene::{CompactPlane, PixelEstimate};
+use rayon::prelude::*;
+use std::marker::PhantomData;
+
+/// One value for each view.
+pub struct Store<T>(Vec<T>);
+
+/// The surfaces that the sources of a view published after a check, in the order of its source list; empty where nothing is
+/// known.
+pub struct PublishedSurfaces<'a>(pub Vec<&'a [CompactPlane]>);
+
+/// The planes of the sources of a view after the stage `S`, in the order of its source list; empty where nothing is known.
+pub struct SourcePlanes<'a, S> {
+    planes: Vec<&'a [PixelEstimate]>,
+    stage: PhantomData<S>,
+}
+
+/// The published surfaces of all views.
+pub struct SurfaceStore(Vec<Vec<CompactPlane>>);
+
+/// Threads that one view keeps busy.
+const THREADS_PER_VIEW: usize = 4;
+
+impl<'a, S> SourcePlanes<'a, S> {
+    /// The planes of these sources.
+    pub fn new(
+        sources: &[u32],
+        planes: impl Fn(usize) -> Option<&'a [PixelEstimate]>,
+    ) -> SourcePlanes<'a, S> {
+        let of_source = |&source: &u32| planes(source as usize).unwrap_or_default();
+        SourcePlanes { planes: sources.iter().map(of_source).collect(), stage: PhantomData }
+    }
+
+    /// By source.
+    pub fn into_vec(self) -> Vec<&'a [PixelEstimate]> {
+        self.planes
+    }
+}
+
+impl<'a> PublishedSurfaces<'a> {
+    /// The surfaces of these sources.
+    pub fn new(sources: &[u32], surface: impl Fn(usize) -> &'a [CompactPlane]) -> PublishedSurfaces<'a> {
+        PublishedSurfaces(sources.iter().map(|&source| surface(source as usize)).collect())
+    }
+}
+
+impl PublishedSurfaces<'_> {
+    /// None of these sources has one.
+    pub fn none(sources: &[u32]) -> Self {
+        PublishedSurfaces(vec![&[]; sources.len()])
+    }
+}
+
+impl SurfaceStore {
+    /// Those of a view's sources.
+    pub fn of_sources(&self, sources: &[u32]) -> PublishedSurfaces<'_> {
+        PublishedSurfaces::new(sources, |source| &self.0[source])
+    }
+}
+
+impl<T: Send> Store<T> {
+    /// Does the same for all views, some at a time: the threads share the work on one view, and while there is not enough of
+    /// it for all of them they work on another one. More views at a time would take more memory.
+    pub fn map<R: Send>(self, stage: impl Fn(usize, T) -> Result<R> + Sync) -> Result<Store<R>> {
+        let at_a_time = 1 + (rayon::current_num_threads() + THREADS_PER_VIEW / 2) / THREADS_PER_VIEW;
+        let mut turns: Vec<Vec<(usize, T)>> = (0..at_a_time).map(|_| Vec::new()).collect();
+        for (view, input) in self.0.into_iter().enumerate() {
+            turns[view % at_a_time].push((view, input));
+        }
+        let one_by_one = |views: Vec<(usize, T)>| -> Result<Vec<(usize, R)>> {
+            views.into_iter().map(|(view, input)| Ok((view, stage(view, input)?))).collect()
+        };
+        let done: Vec<_> = turns.into_par_iter().with_max_len(1).map(one_by_one).collect::<Result<_>>()?;
+        let mut done: Vec<(usize, R)> = done.into_iter().flatten().collect();
+        done.sort_unstable_by_key(|(view, _)| *view);
+        Ok(Store(done.into_iter().map(|(_, result)| result).collect()))
+    }
+
+    /// The same with the values of all views kept.
+    pub fn map_ref<R: Send>(&self, stage: impl Fn(usize, &T) -> Result<R> + Sync) -> Result<Store<R>>
+    where
+        T: Sync,
+    {
+        Store((0..self.0.len()).collect()).map(|_, view: usize| stage(view, &self.0[view]))
+    }
+
+    /// Both values of each view.
+    pub fn zip<U: Send>(self, other: Store<U>) -> Store<(T, U)> {
+        Store(self.0.into_iter().zip(other.0).collect())
+    }
+
+    /// By view.
+    pub fn into_vec(self) -> Vec<T> {
+        self.0
+    }
+}
+
+impl Store<Option<ViewEstimate<Checked>>> {
+    /// Before the first cycle.
+    pub fn unknown(views: usize) -> Self {
+        Store((0..views).map(|_| None).collect())
+    }
+
+    /// The estimates that are known.
+    pub fn known(&self) -> impl Iterator<Item = &ViewEstimate<Checked>> {
+        self.0.iter().flatten()
+    }
+
+    /// After the first cycle all are known.
+    pub fn all_known(self) -> Store<ViewEstimate<Checked>> {
+        Store(self.0.into_iter().flatten().collect())
+    }
+
+    /// The checked planes of a view.
+    pub fn planes(&self, view: usize) -> Option<&[PixelEstimate]> {
+        self.0[view].as_ref().map(ViewEstimate::planes)
+    }
+
+    /// Takes the published surfaces out of the estimates.
+    pub fn take_surfaces(mut self) -> (Self, SurfaceStore) {
+        let take = |own: &mut Option<ViewEstimate<Checked>>| own.as_mut().map(ViewEstimate::take_surface);
+        let surfaces = self.0.iter_mut().map(|own| take(own).unwrap_or_default()).collect();
+        (self, SurfaceStore(surfaces))
+    }
+}
+
+impl<S> Store<ViewEstimate<S>> {
+    /// The planes of a view's sources.
+    pub fn planes_of_sources(&self, sources: &[u32]) -> SourcePlanes<'_, S> {
+        SourcePlanes::new(sources, |source| Some(self.0[source].planes()))
+    }
+}
+
+impl Store<ViewEstimate<Checked>> {
+    /// The published surfaces of a view's sources.
+    pub fn surfaces_of_sources(&self, sources: &[u32]) -> PublishedSurfaces<'_> {
+        PublishedSurfaces::new(sources, |source| self.0[source].surface())
+    }
+
+    /// Takes the published surfaces out of the estimates.
+    pub fn take_surfaces(mut self) -> (Self, SurfaceStore) {
+        let surfaces = self.0.iter_mut().map(ViewEstimate::take_surface).collect();
+        (self, SurfaceStore(surfaces))
+    }
+}
