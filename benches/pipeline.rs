@@ -1,5 +1,5 @@
-//! The whole run on the embedded photographs, all cores: `cargo bench --features io --bench pipeline`. An element is a
-//! pixel. It takes minutes.
+//! The whole run on the embedded photographs, all cores: `cargo bench --features io --bench pipeline`. An
+//! element is a pixel. It takes minutes.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use skep::io::read_scene;

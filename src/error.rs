@@ -1,19 +1,26 @@
-//! What can go wrong, in words that say what would have been right.
+//! The error type: what was wrong, and what was expected.
 
 use std::fmt;
 use std::path::PathBuf;
 
 /// The error of every fallible call of the crate.
+///
+/// # Examples
+/// ```
+/// let error = skep::Options::default().set("check.depth_tolerance", "2").unwrap_err();
+/// assert!(matches!(&error, skep::Error::Argument { value, .. } if value == "2"));
+/// assert!(error.to_string().contains("check.depth_tolerance is 2; expected"));
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Error {
-    /// A value handed in cannot be used.
+    /// An argument is wrong.
     Argument {
-        /// What was handed in, for example `views[3].camera.fx`.
+        /// The argument, for example `views[3].camera.fx`.
         name: String,
-        /// The value as it was read.
+        /// Its value.
         value: String,
-        /// What would have been right.
+        /// What was expected instead.
         expected: String,
     },
     /// A file cannot be read, understood or written.
@@ -22,10 +29,10 @@ pub enum Error {
         path: PathBuf,
         /// The line, counted from 1, when the file is text.
         line: Option<usize>,
-        /// What is wrong and what would have been right.
+        /// What is wrong and what was expected.
         problem: String,
     },
-    /// The progress hook asked to stop. Nothing that was finished is lost.
+    /// The progress function returned `Break`.
     Cancelled,
 }
 
@@ -33,7 +40,7 @@ pub enum Error {
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
-    /// A value handed in cannot be used; `expected` says what would have been right.
+    /// An argument is wrong; `expected` says what would have been right.
     pub fn argument(name: impl Into<String>, value: impl fmt::Display, expected: impl Into<String>) -> Self {
         Error::Argument { name: name.into(), value: value.to_string(), expected: expected.into() }
     }

@@ -313,7 +313,7 @@ fn far_from_the_world_s_origin_nothing_is_lost() {
 }
 
 #[test]
-fn the_hook_follows_the_fusion_and_can_stop_it() {
+fn progress_follows_the_fusion_and_can_cancel_it() {
     let made = procedural::occluding_post();
     let overlap = all_others(made.views.len());
     let views = fusion_views(&made, &made.truth, &overlap);
@@ -336,15 +336,15 @@ fn the_hook_follows_the_fusion_and_can_stop_it() {
 }
 
 #[test]
-fn only_what_is_validated_counts_where_outcomes_are_given() {
+fn only_validated_pixels_count_where_statuses_are_given() {
     let made = procedural::textureless_panel();
     let overlap = all_others(made.truth.len());
     let left_out = |pixel: usize| pixel.is_multiple_of(3);
-    let outcomes: Vec<PixelStatus> = (0..made.truth[0].depth.len())
+    let statuses: Vec<PixelStatus> = (0..made.truth[0].depth.len())
         .map(|pixel| if left_out(pixel) { PixelStatus::Inconsistent } else { PixelStatus::Validated })
         .collect();
-    let mut with_outcomes = fusion_views(&made, &made.truth, &overlap);
-    with_outcomes.iter_mut().for_each(|view| view.status = Some(&outcomes));
+    let mut with_status = fusion_views(&made, &made.truth, &overlap);
+    with_status.iter_mut().for_each(|view| view.status = Some(&statuses));
     let mut without = made.truth.to_vec();
     for maps in &mut without {
         maps.depth
@@ -353,7 +353,7 @@ fn only_what_is_validated_counts_where_outcomes_are_given() {
             .filter(|(pixel, _)| left_out(*pixel))
             .for_each(|(_, depth)| *depth = 0.0);
     }
-    let cloud = fuse(&with_outcomes, &OPTIONS, &ignore_progress).unwrap();
+    let cloud = fuse(&with_status, &OPTIONS, &ignore_progress).unwrap();
     assert!(!cloud.positions.is_empty());
     assert!(cloud == fuse_maps(&made, &without, OPTIONS));
 }
@@ -393,7 +393,8 @@ fn no_views_make_an_empty_cloud() {
 fn a_pixel_that_became_part_of_a_point_starts_none() {
     let made = procedural::plane_and_sphere();
     let cloud = fuse_maps(&made, &made.truth, OPTIONS);
-    // The first view starts a point for each of its pixels that enough others see; later ones fill what is left.
+    // The first view starts a point for each of its pixels that enough others see; later ones fill what is
+    // left.
     let starts =
         |view: u32| (0..cloud.views.len()).filter(|&point| cloud.views.get(point)[0] == view).count();
     let first = starts(0);

@@ -5,19 +5,20 @@ use skep::{Options, PixelStatus, Progress};
 use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::process::ExitCode;
 
-fn main() {
+fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let status = match &arguments[..] {
-        [scene, dense] => reconstruct(Path::new(scene), Path::new(dense)),
-        _ => {
-            eprintln!("usage: reconstruct SCENE DENSE (SCENE holds images/ and sparse/)");
-            std::process::exit(2);
-        }
+    let [scene, dense] = &arguments[..] else {
+        eprintln!("usage: reconstruct SCENE DENSE (SCENE holds images/ and sparse/)");
+        return ExitCode::from(2);
     };
-    if let Err(error) = status {
-        eprintln!("reconstruct: {error}");
-        std::process::exit(1);
+    match reconstruct(Path::new(scene), Path::new(dense)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("reconstruct: {error}");
+            ExitCode::FAILURE
+        }
     }
 }
 

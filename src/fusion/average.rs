@@ -1,4 +1,4 @@
-//! The average of the pixels that agree on a point.
+//! The average of the pixels of a point.
 
 use glam::DVec3;
 
@@ -8,29 +8,30 @@ pub(super) struct Member {
     pub(super) view: u32,
     /// Index in its view's maps.
     pub(super) pixel: usize,
-    /// In the world's axes.
+    /// Relative to the reference's center, in world axes: large world coordinates lose no digits.
     pub(super) position: DVec3,
-    /// Unit, in the world's axes.
+    /// Unit, in world axes.
     pub(super) normal: DVec3,
-    /// In the average.
+    /// Weight in the average.
     pub(super) weight: f64,
 }
 
-/// Members further from the median than this many median absolute deviations (two standard deviations of Gaussian
-/// errors) are left out: depths that agree within a percent may still be worse than what they would be averaged with.
+/// Members further from the median than this many median absolute deviations (two standard deviations of
+/// Gaussian errors) are left out: depths that agree within a percent may still be worse than what they would
+/// be averaged with.
 const MAX_DEVIATIONS: f64 = 3.0;
 
-/// Color of points no picture sees.
+/// Color of points without a picture.
 const GRAY: [u8; 3] = [128; 3];
 
-/// Weighted means of position, normal (unit) and color over the members that lie closest together; the first is the
-/// one the point started from. `color` is `None` for members without a picture.
+/// Weighted means of position, normal (unit) and color over the members that lie closest together; the first
+/// is the one the point started from. `color` is `None` for members without a picture.
 pub(super) fn average(
     members: &[Member],
     color: impl Fn(&Member) -> Option<[u8; 3]>,
 ) -> (DVec3, DVec3, [u8; 3]) {
     let start = &members[0];
-    // Along the normal only: a pixel's center lies anywhere within half a pixel of the point.
+    // Along the normal only: across it, pixel centers differ from the point by up to half a pixel.
     let height = |member: &Member| (member.position - start.position).dot(start.normal);
     let middle = median(members.iter().map(height).collect());
     let deviation = |member: &Member| (height(member) - middle).abs();

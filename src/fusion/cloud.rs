@@ -9,11 +9,21 @@ pub struct PointCloud {
     pub normals: Vec<[f32; 3]>,
     /// Red, green, blue.
     pub colors: Vec<[u8; 3]>,
-    /// The views each point was fused from, as indices into the scene, the first being the one it started in.
+    /// The views each point was fused from, as indices into the scene; first the one it started in.
     pub views: PointViews,
 }
 
 /// A list of views for each point, in one allocation.
+///
+/// # Examples
+/// ```
+/// let mut views = skep::PointViews::default();
+/// views.push(&[0, 2]);
+/// views.push(&[]);
+/// views.push(&[1]);
+/// assert_eq!((views.len(), views.total()), (3, 3));
+/// assert_eq!(views.get(0), [0, 2]);
+/// ```
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct PointViews {
     ends: Vec<usize>,
@@ -33,7 +43,7 @@ impl PointViews {
         &self.views[start..self.ends[point]]
     }
 
-    /// Lengths of all lists added up.
+    /// Sum of the lengths of all lists.
     pub fn total(&self) -> usize {
         self.views.len()
     }

@@ -1,8 +1,10 @@
 //! Fusion of depth and normal maps into points (section 6 of the paper).
 //!
-//! Every pixel with a depth is a point that the overlapping views vouch for or against. One with enough agreeing
-//! views becomes a point of the cloud, averaged over them, and uses up the pixel it falls on in each: those start no
-//! points of their own. Pixels no point falls on do, so the cloud stays as dense as the view that saw a surface best.
+//! Views are the reference one after the other. The point behind each of its pixels is projected into the
+//! overlapping views and compared with the depth and normal of the pixel on which it falls. With enough
+//! consistent views it becomes a point of the cloud, averaged over them, and their pixels start no points of
+//! their own. Pixels on which no point falls do, so the cloud is as dense as the view that saw a surface
+//! best.
 
 mod average;
 mod cloud;
@@ -14,41 +16,77 @@ use crate::geometry::Camera;
 use crate::image::Picture;
 use crate::options::FusionOptions;
 use crate::pipeline::{Phase, Progress, ProgressFn};
-use crate::scene::Maps;
-use crate::scene::PixelStatus;
+use crate::scene::{Maps, PixelStatus};
 use average::{Member, average};
 pub use cloud::{PointCloud, PointViews};
 use glam::{DVec2, DVec3};
 pub use overlap::overlaps;
 use rayon::prelude::*;
-use source::{Opinion, Source};
+use source::{Comparison, Source};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A view with its maps, as fusion needs it.
+/// A view with its maps: the input of [`fuse`].
 #[derive(Debug, Clone, Copy)]
 pub struct FusionView<'a> {
     /// The camera of the maps.
     pub camera: &'a Camera,
-    /// Depth and normal, one each a pixel. A depth that is not a finite number above 0 is no estimate.
+    /// Depth and normal of every pixel. A depth that is not a finite number above 0 is no estimate.
     pub maps: &'a Maps,
-    /// What became of each pixel: only validated ones are estimates. Without it all with a depth are.
+    /// The status of every pixel: only validated ones are fused. `None` fuses all that have a depth.
     pub status: Option<&'a [PixelStatus]>,
-    /// For the colors; gray (128) without.
+    /// The photograph, for the colors; points are gray (128) without.
     pub picture: Option<&'a Picture>,
     /// The views that may see the same surface, as indices into the list of views.
     pub overlap: &'a [u32],
 }
 
-/// Rows fused at once: the hook is asked before each such band.
+/// Rows fused in parallel between two calls of the progress function.
 const BAND_ROWS: u32 = 32;
 
-/// Fuses the maps of all views, on the threads of the current rayon pool; the cloud is the same for any number of
-/// them. The hook sees [`Phase::Fusion`] with `done` from 0 to 1 for the fusion alone.
+/// Fuses the maps of all views, on the threads of the current rayon pool; the cloud does not depend on their
+/// number. The progress function gets [`Phase::Fusion`] with `done` from 0 to 1 for the fusion alone.
 ///
 /// # Errors
-/// Options out of range; a camera that makes no sense; maps or a picture of another size than their camera; an
-/// overlap that names a view there is not, the view itself or a view twice; [`Error::Cancelled`].
-pub fn fuse(views: &[FusionView], options: &FusionOptions, hook: ProgressFn) -> Result<PointCloud> {
+/// Options out of range; an invalid camera; maps or a picture of another size than their camera; an overlap
+/// that names no view of the list, the view itself or a view twice; [`Error::Cancelled`].
+///
+/// # Examples
+/// The plane z = 2 seen by two cameras side by side:
+/// ```
+/// use glam::{DMat3, DVec3};
+/// use skep::fusion::{FusionView, fuse};
+/// use skep::geometry::Camera;
+/// use skep::{FusionOptions, Maps, ignore_progress};
+///
+/// let camera = |x: f64| Camera {
+///     width: 8,
+///     height: 6,
+///     fx: 10.0,
+///     fy: 10.0,
+///     cx: 3.5,
+///     cy: 2.5,
+///     rotation: DMat3::IDENTITY,
+///     translation: DVec3::new(-x, 0.0, 0.0),
+/// };
+/// let cameras = [camera(0.0), camera(0.2)];
+/// let maps = Maps { depth: vec![2.0; 48], normal: vec![[0.0, 0.0, -1.0]; 48] };
+/// let overlaps = [[1], [0]];
+/// let view = |index: usize| FusionView {
+///     camera: &cameras[index],
+///     maps: &maps,
+///     status: None,
+///     picture: None,
+///     overlap: &overlaps[index],
+/// };
+/// let options = FusionOptions { depth_tolerance: 0.01, normal_tolerance: 30.0, min_views: 1 };
+/// let cloud = fuse(&[view(0), view(1)], &options, &ignore_progress)?;
+/// // The second camera sees everything one pixel further left: 7 columns are common to both.
+/// assert_eq!(cloud.positions.len(), 7 * 6);
+/// assert_eq!(cloud.positions[0][2], 2.0);
+/// assert_eq!(cloud.views.get(0), [0, 1]);
+/// # Ok::<(), skep::Error>(())
+/// ```
+pub fn fuse(views: &[FusionView], options: &FusionOptions, progress: ProgressFn) -> Result<PointCloud> {
     options.check()?;
     for index in 0..views.len() {
         check_view(views, index)?;
@@ -58,9 +96,8 @@ pub fn fuse(views: &[FusionView], options: &FusionOptions, hook: ProgressFn) -> 
     let mut rows_done = 0;
     let report = |view: usize, rows_done: u64| {
         let done = rows_done as f64 / total_rows.max(1) as f64;
-        let progress =
-            Progress { phase: Phase::Fusion, downscale: 1, cycle: 0, view, views: views.len(), done };
-        if hook(&progress).is_break() { Err(Error::Cancelled) } else { Ok(()) }
+        let at = Progress { phase: Phase::Fusion, downscale: 1, cycle: 0, view, views: views.len(), done };
+        if progress(&at).is_break() { Err(Error::Cancelled) } else { Ok(()) }
     };
 
     let mut cloud = PointCloud::default();
@@ -132,7 +169,7 @@ fn estimate(view: &FusionView, pixel: usize) -> Option<(f64, DVec3)> {
     (depth > 0.0 && depth.is_finite()).then_some((f64::from(depth), normal))
 }
 
-/// The pixels of a view that are part of a point, a bit each.
+/// The pixels of a view that are part of a point, one bit each.
 struct Used(Vec<AtomicU64>);
 
 impl Used {
@@ -149,14 +186,14 @@ impl Used {
     }
 }
 
-/// The view whose pixels become points. Positions are relative to its center: large world coordinates lose no digits.
+/// The view whose pixels become points.
 struct Reference<'a> {
     views: &'a [FusionView<'a>],
     index: usize,
     options: &'a FusionOptions,
     sources: Vec<Source<'a>>,
-    /// By view and pixel, whether the pixel is part of a point. While one view is the reference, its own flags are only
-    /// read and those of the others only set: the order of the threads does not matter.
+    /// By view and pixel, whether the pixel is part of a point. While one view is the reference, its own
+    /// flags are only read and those of the others only set: the order of the threads does not matter.
     used: &'a [Used],
 }
 
@@ -189,7 +226,7 @@ impl<'a> Reference<'a> {
                 normal: to_world * normal,
                 weight: weight(view.camera, depth),
             };
-            if !self.gather(start, position, depth, &mut members) {
+            if !self.collect_members(start, position, depth, &mut members) {
                 continue;
             }
             for member in &members[1..] {
@@ -208,19 +245,19 @@ impl<'a> Reference<'a> {
         points
     }
 
-    /// Collects the start and the pixels of other views that agree with it; whether that makes a point.
-    fn gather(&self, start: Member, pixel: DVec2, depth: f64, members: &mut Vec<Member>) -> bool {
+    /// Collects the start and the consistent pixels of other views; `true` when they make a point.
+    fn collect_members(&self, start: Member, pixel: DVec2, depth: f64, members: &mut Vec<Member>) -> bool {
         members.clear();
         members.push(start);
         let mut conflicts = 0;
         for source in &self.sources {
-            match source.opinion(pixel, depth, &start) {
-                Opinion::Agrees(member) => members.push(member),
-                Opinion::SeesThrough => conflicts += 1,
-                Opinion::None => {}
+            match source.compare(pixel, depth, &start) {
+                Comparison::Consistent(member) => members.push(member),
+                Comparison::SeesThrough => conflicts += 1,
+                Comparison::Unknown => {}
             }
         }
-        // Edges of thin things are seen past by some views that are half a pixel off; only a majority is believed.
+        // At edges of thin things, views that are half a pixel off see past them: it takes a majority.
         members.len() > self.options.min_views as usize && conflicts <= members.len()
     }
 }

@@ -1,10 +1,10 @@
-//! Which views may see the same surface.
+//! Which views overlap.
 
 use crate::scene::SparsePoint;
 use std::collections::BTreeSet;
 
-/// For each of `views` views those that may see the same surface: those that saw a sparse point together with it, or
-/// all others for a view that saw none. A point's views must be below `views`.
+/// For each of `views` views those that may see the same surface: those that saw a sparse point together with
+/// it, or all others for a view that saw none. A point's views must be below `views`.
 pub fn overlaps(views: usize, points: &[SparsePoint]) -> Vec<Vec<u32>> {
     let mut overlaps = vec![BTreeSet::new(); views];
     for point in points {

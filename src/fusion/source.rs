@@ -1,4 +1,4 @@
-//! What another view says about a point of the reference view.
+//! The comparison of a point of the reference view with the maps of another view.
 
 use super::average::Member;
 use super::{FusionView, estimate, weight};
@@ -6,29 +6,30 @@ use crate::geometry::Camera;
 use crate::options::FusionOptions;
 use glam::{DMat3, DVec2, DVec3};
 
-/// What a view's maps say about a point.
-pub(super) enum Opinion {
-    /// Its pixel there carries the same surface.
-    Agrees(Member),
-    /// Its pixel there carries a surface clearly behind: the point would hide it.
+/// How a view's maps compare with a point.
+pub(super) enum Comparison {
+    /// The view's pixel has the same depth and normal.
+    Consistent(Member),
+    /// The view's pixel has a surface clearly behind the point: the point would occlude it.
     SeesThrough,
-    /// Outside, no estimate, or hidden by something nearer.
-    None,
+    /// The point is outside the image or occluded, or its pixel has no estimate or another normal.
+    Unknown,
 }
 
-/// A view's surface lies clearly behind a point beyond this many depth tolerances.
+/// Depth tolerances beyond which a view's surface is clearly behind a point: at one, noise would do.
 const CONFLICT_TOLERANCES: f64 = 2.0;
 
-/// A view that overlaps the reference, with the maps from one to the other.
+/// A view that overlaps the reference, with the transforms from one to the other.
 pub(super) struct Source<'a> {
     index: u32,
     view: &'a FusionView<'a>,
-    /// Homogeneous pixel here of the point at depth 1 behind a homogeneous reference pixel, but for `shift`.
+    /// `K' R K^-1`: a reference pixel (x, y, 1) at depth d falls on `transfer (x, y, 1) d + shift`.
     transfer: DMat3,
+    /// `K' t`.
     shift: DVec3,
-    /// Camera directions to the world.
+    /// Rotation from the camera to the world.
     to_world: DMat3,
-    /// The camera's center from the reference's.
+    /// The camera's center relative to the reference's, in world axes.
     center: DVec3,
     depth_tolerance: f64,
     min_cosine: f64,
@@ -56,28 +57,34 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// What this view says about the reference's `start`, the point at `depth` behind `pixel`.
-    pub(super) fn opinion(&self, pixel: DVec2, depth: f64, start: &Member) -> Opinion {
+    /// Compares the reference's `start`, the point at `depth` on the ray of `pixel`, with this view's maps.
+    pub(super) fn compare(&self, pixel: DVec2, depth: f64, start: &Member) -> Comparison {
         let point = self.transfer * pixel.extend(1.0) * depth + self.shift;
         if point.z <= 0.0 {
-            return Opinion::None;
+            return Comparison::Unknown;
         }
         let camera = self.view.camera;
         let Some((column, row)) = camera.nearest_pixel(point.truncate() / point.z) else {
-            return Opinion::None;
+            return Comparison::Unknown;
         };
         let pixel = row as usize * camera.width as usize + column as usize;
-        let Some((depth, normal)) = estimate(self.view, pixel) else { return Opinion::None };
+        let Some((depth, normal)) = estimate(self.view, pixel) else { return Comparison::Unknown };
         let difference = depth - point.z;
         if difference > CONFLICT_TOLERANCES * self.depth_tolerance * point.z {
-            return Opinion::SeesThrough;
+            return Comparison::SeesThrough;
         }
         let normal = self.to_world * normal;
         if difference.abs() > self.depth_tolerance * point.z || normal.dot(start.normal) < self.min_cosine {
-            return Opinion::None;
+            return Comparison::Unknown;
         }
         let ray = camera.ray(DVec2::new(f64::from(column), f64::from(row)));
         let position = self.center + self.to_world * (ray * depth);
-        Opinion::Agrees(Member { view: self.index, pixel, position, normal, weight: weight(camera, depth) })
+        Comparison::Consistent(Member {
+            view: self.index,
+            pixel,
+            position,
+            normal,
+            weight: weight(camera, depth),
+        })
     }
 }

@@ -17,7 +17,21 @@ pub struct Grid<T> {
     pub values: Vec<T>,
 }
 
-/// Writes a depth map: world units, 0 where there is none.
+/// Writes a depth map: depths in world units, 0 where there is none.
+///
+/// # Examples
+/// ```
+/// use skep::io::{read_depth_map, write_depth_map};
+///
+/// let folder = tempfile::tempdir().unwrap();
+/// let path = folder.path().join("a.jpg.geometric.bin");
+/// write_depth_map(&path, 3, 2, &[1.0, 1.5, 0.0, 1.0, 1.5, 2.0])?;
+/// assert_eq!(read_depth_map(&path)?.values[1], 1.5);
+/// // A map that does not fit its size is refused, and nothing is written.
+/// let error = write_depth_map(&path, 3, 2, &[1.0]).unwrap_err();
+/// assert_eq!(error.to_string(), "depth map is 1 values; expected one for each of 3 x 2 pixels");
+/// # Ok::<(), skep::Error>(())
+/// ```
 pub fn write_depth_map(path: &Path, width: u32, height: u32, depth: &[f32]) -> Result<()> {
     check_length("depth map", width, height, depth.len())?;
     write_map(path, width, height, 1, |_, pixel| depth[pixel])
@@ -50,8 +64,8 @@ fn write_map(
 /// Reads a depth map.
 ///
 /// # Errors
-/// Not one channel; a size that does not match the header; a depth that is negative or not finite: neither COLMAP nor
-/// this crate writes one, so the file is damaged or of another kind.
+/// Not one channel; a size that does not match the header; a depth that is negative or not finite: neither
+/// COLMAP nor this crate writes one, so the file is damaged or of another kind.
 pub fn read_depth_map(path: &Path) -> Result<Grid<f32>> {
     let (mut file, width, height) = open_map(path, 1)?;
     let mut values = vec![0.0; width as usize * height as usize];
@@ -105,7 +119,7 @@ fn open_map(path: &Path, channels: u32) -> Result<(FileReader, u32, u32)> {
     Ok((file, width, height))
 }
 
-/// Reads `W&H&C&` and demands the number of channels.
+/// Reads `W&H&C&` and checks the number of channels.
 fn open_header(path: &Path, channels: u32) -> Result<(FileReader, u32, u32)> {
     let mut file = FileReader::open(path)?;
     let mut numbers = [0u32; 3];
@@ -141,8 +155,8 @@ pub struct ConsistencyGraph {
     pub views: PointViews,
 }
 
-/// Writes a consistency graph; `views_of` gives a pixel's views by its index (row * width + column), as indices into
-/// the images in the order of the model's file. A pixel without views is not listed.
+/// Writes a consistency graph; `views_of` gives a pixel's views by its index (row * width + column), as
+/// indices into the images in the order of the model's file. A pixel without views is not listed.
 pub fn write_consistency_graph<Views: Iterator<Item = u32>>(
     path: &Path,
     width: u32,
@@ -157,8 +171,8 @@ pub fn write_consistency_graph<Views: Iterator<Item = u32>>(
                 views.clear();
                 views.extend(views_of(row as usize * width as usize + column as usize));
                 if !views.is_empty() {
-                    write_whole(out, &[column, row, views.len() as u32])?;
-                    write_whole(out, &views)?;
+                    write_u32s(out, &[column, row, views.len() as u32])?;
+                    write_u32s(out, &views)?;
                 }
             }
         }
@@ -166,7 +180,7 @@ pub fn write_consistency_graph<Views: Iterator<Item = u32>>(
     })
 }
 
-fn write_whole(out: &mut impl Write, numbers: &[u32]) -> io::Result<()> {
+fn write_u32s(out: &mut impl Write, numbers: &[u32]) -> io::Result<()> {
     numbers.iter().try_for_each(|number| out.write_all(&number.to_le_bytes()))
 }
 

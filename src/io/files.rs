@@ -1,4 +1,4 @@
-//! Files that are written whole or not at all, and binary files whose ends are watched.
+//! Files that are written whole or not at all, and a reader of binary files that checks every size.
 
 use crate::error::{Error, Result};
 use std::fs::File;
@@ -31,13 +31,13 @@ pub fn write_file(
     attempt().map_err(|error| Error::file(path, format!("cannot be written: {error}")))
 }
 
-/// Whether a view of this name has its files inside the folder they belong in.
+/// Whether the files of a view of this name lie inside their folder.
 pub(super) fn stays_inside(name: &str) -> bool {
     let is_below = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
     !name.is_empty() && is_below && !name.contains(char::is_control)
 }
 
-/// What [`stays_inside`] demands.
+/// What [`stays_inside`] requires, for error texts.
 pub(super) const NAME_INSIDE: &str = "a path below the folder of images, without `..`";
 
 /// Copies a file, whole or not at all.
@@ -46,7 +46,7 @@ pub(super) fn copy_file(from: &Path, to: &Path) -> Result<()> {
     write_file(to, |out| io::copy(&mut source, out).map(drop))
 }
 
-/// Makes a file appear in a second place without taking more room; one that cannot be linked there is copied.
+/// Hard-links a file to a second place; copies it where it cannot be linked.
 pub(super) fn link_or_copy(from: &Path, to: &Path) -> Result<()> {
     if let Some(parent) = to.parent() {
         let made = std::fs::create_dir_all(parent);
@@ -58,7 +58,7 @@ pub(super) fn link_or_copy(from: &Path, to: &Path) -> Result<()> {
     }
 }
 
-/// A file read from start to end, which never asks for more bytes than it holds.
+/// Reads a file from start to end and never past its size.
 pub(super) struct FileReader {
     path: PathBuf,
     reader: BufReader<File>,
@@ -89,7 +89,8 @@ impl FileReader {
         self.remaining
     }
 
-    /// Refuses the file unless it holds `count` more entries of `size` bytes; what passes fits into memory sizes.
+    /// Refuses the file unless it holds `count` more entries of `size` bytes; what passes fits into memory
+    /// sizes.
     pub(super) fn require(&self, count: u64, size: u64, what: &str) -> Result<()> {
         match count.checked_mul(size) {
             Some(bytes) if bytes <= self.remaining => Ok(()),
@@ -135,7 +136,7 @@ impl FileReader {
         Err(self.error(format!("{what} is {values:?}; expected finite numbers")))
     }
 
-    /// Passes over `count` entries of `size` bytes.
+    /// Skips `count` entries of `size` bytes.
     pub(super) fn skip(&mut self, count: u64, size: u64, what: &str) -> Result<()> {
         self.require(count, size, what)?;
         let bytes = count * size;
@@ -144,16 +145,16 @@ impl FileReader {
         Ok(())
     }
 
-    /// Refuses a file that goes on.
+    /// Refuses a file that has bytes left.
     pub(super) fn finish(self) -> Result<()> {
         match self.remaining {
             0 => Ok(()),
-            bytes => Err(self.error(format!("{bytes} bytes too many after what its counts announce"))),
+            bytes => Err(self.error(format!("{bytes} bytes too many, after the end that its counts give"))),
         }
     }
 }
 
-/// The error of a file the system will not hand out.
+/// The error of a file that cannot be opened or read.
 pub(super) fn cannot_be_read(path: &Path, error: impl std::fmt::Display) -> Error {
     Error::file(path, format!("cannot be read: {error}"))
 }

@@ -10,8 +10,9 @@ use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::Path;
 
-/// Reads a PNG or JPEG file, color or gray, 8 or 16 bits (16 are rounded to 8). An alpha channel is dropped; nothing
-/// else is applied, neither an orientation nor a color profile: the calibration speaks of the stored pixels.
+/// Reads a PNG or JPEG file, color or gray, 8 or 16 bits (16 are rounded to 8). An alpha channel is dropped;
+/// nothing else is applied, neither an orientation nor a color profile: the calibration speaks of the stored
+/// pixels.
 pub fn read_picture(path: &Path) -> Result<Picture> {
     let image = open(path)?.decode().map_err(|error| cannot_be_read(path, error))?;
     let (width, height) = (image.width(), image.height());
@@ -42,7 +43,7 @@ fn is_gray(image: &DynamicImage) -> bool {
     matches!(image.color(), ColorType::L8 | ColorType::La8 | ColorType::L16 | ColorType::La16)
 }
 
-/// The content decides what kind of file it is, not the name.
+/// The format is detected from the content, not from the name.
 fn open(path: &Path) -> Result<ImageReader<BufReader<File>>> {
     let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
     let mut reader = reader.map_err(|error| cannot_be_read(path, error))?;

@@ -12,7 +12,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 
-/// Names of the properties in the order COLMAP demands: floats, then bytes.
+/// Names of the properties in COLMAP's order: floats, then bytes.
 const FLOATS: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
 const BYTES: [&str; 3] = ["red", "green", "blue"];
 
@@ -135,8 +135,8 @@ pub fn read_ply(path: &Path) -> Result<PointCloud> {
     Ok(cloud)
 }
 
-/// Writes the views of each point (`fused.ply.vis`): a u64 count, then for each point a u32 count and the views as u32
-/// indices into the images in the order of the model's file.
+/// Writes the views of each point (`fused.ply.vis`): a u64 count, then for each point a u32 count and the
+/// views as u32 indices into the images in the order of the model's file.
 pub fn write_visibility(path: &Path, views: &PointViews) -> Result<()> {
     write_file(path, |out| {
         out.write_all(&(views.len() as u64).to_le_bytes())?;

@@ -1,4 +1,4 @@
-//! Maps as pictures for the eye. Pixels without an estimate are black.
+//! Maps as pictures to look at. Pixels without an estimate are black.
 
 use super::colmap_maps::check_length;
 use super::files::write_file;
@@ -8,7 +8,7 @@ use image::{ExtendedColorType, ImageEncoder};
 use std::io;
 use std::path::Path;
 
-/// Far to near, of even steps in lightness.
+/// Colors from far to near, in even steps of lightness.
 const COLORS: [[f32; 3]; 6] = [
     [48.0, 18.0, 94.0],
     [58.0, 64.0, 158.0],
@@ -17,8 +17,8 @@ const COLORS: [[f32; 3]; 6] = [
     [134.0, 206.0, 72.0],
     [252.0, 236.0, 84.0],
 ];
-/// Percentiles of the inverse depths between which the colors spread.
-const SPREAD: (f64, f64) = (0.02, 0.98);
+/// Percentiles of the inverse depths at the ends of the color scale: outliers do not stretch it.
+const PERCENTILES: (f64, f64) = (0.02, 0.98);
 
 /// Writes depths as colors over inverse depth: near is bright.
 pub fn write_depth_preview(path: &Path, width: u32, height: u32, depth: &[f32]) -> Result<()> {
@@ -29,7 +29,7 @@ pub fn write_depth_preview(path: &Path, width: u32, height: u32, depth: &[f32]) 
         let index = (inverse.len().saturating_sub(1) as f64 * share).round() as usize;
         inverse.get(index).copied().unwrap_or_default()
     };
-    let (far, near) = (percentile(SPREAD.0), percentile(SPREAD.1));
+    let (far, near) = (percentile(PERCENTILES.0), percentile(PERCENTILES.1));
     let scale = 1.0 / (near - far).max(f32::MIN_POSITIVE);
     write_rgb(path, width, height, |pixel| match depth[pixel] {
         depth if depth > 0.0 => color((1.0 / depth - far) * scale),
@@ -37,7 +37,7 @@ pub fn write_depth_preview(path: &Path, width: u32, height: u32, depth: &[f32]) 
     })
 }
 
-/// The color at a share of the way from far to near, linear between the table's.
+/// The color at a fraction of the scale from far (0) to near (1), linear between those of the table.
 fn color(share: f32) -> [u8; 3] {
     let place = share.clamp(0.0, 1.0) * (COLORS.len() - 1) as f32;
     let index = (place as usize).min(COLORS.len() - 2);
@@ -58,8 +58,8 @@ pub fn write_normal_preview(path: &Path, width: u32, height: u32, normal: &[[f32
     })
 }
 
-/// Writes the number of source views of each pixel as brightness: all `sources` are white. `count` gives the number
-/// by the pixel's index (row * width + column).
+/// Writes the number of source views of each pixel as brightness: all `sources` are white. `count` gives the
+/// number by the pixel's index (row * width + column).
 pub fn write_views_preview(
     path: &Path,
     width: u32,

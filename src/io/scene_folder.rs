@@ -4,23 +4,22 @@ use super::colmap_model::ColmapModel;
 use super::files::{NAME_INSIDE, stays_inside};
 use super::pictures::{picture_size, read_picture, write_picture};
 use crate::error::{Error, Result};
-use crate::geometry::Camera;
-use crate::geometry::DepthRange;
+use crate::geometry::{Camera, DepthRange};
 use crate::image::Picture;
 use crate::scene::{Scene, View};
 use std::path::{Path, PathBuf};
 
-/// Where a scene's photographs and model lie.
+/// The folders of a scene's photographs and model.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SceneFolder {
-    /// The folder the names of the model's images are relative to.
+    /// The folder that the names of the model's images are relative to.
     pub images: PathBuf,
     /// The folder of the model.
     pub sparse: PathBuf,
 }
 
 impl SceneFolder {
-    /// Finds the model in `sparse/`, else in `sparse/0/`. Whether `images/` is there is not asked yet.
+    /// Finds the model in `sparse/`, else in `sparse/0/`. Does not check for `images/`.
     pub fn find(folder: &Path) -> Result<SceneFolder> {
         if !folder.is_dir() {
             return Err(Error::file(folder, "no such folder; expected one with images/ and sparse/"));
@@ -46,7 +45,7 @@ impl SceneFolder {
             let sparse = self.sparse.display();
             return Err(Error::file(
                 &path,
-                format!("missing; the model in {sparse} has an image of this name"),
+                format!("no such file; the model in {sparse} has an image of this name"),
             ));
         }
         let (width, height) = picture_size(&path)?;
@@ -61,8 +60,8 @@ impl SceneFolder {
 /// Reads a scene; `depth_range` holds for every view and is needed where the model has no points.
 ///
 /// # Errors
-/// What is missing from the folder; what [`ColmapModel::read`], [`SceneFolder::read_picture`] and [`Scene::new`]
-/// refuse.
+/// What is missing from the folder; what [`ColmapModel::read`], [`SceneFolder::read_picture`] and
+/// [`Scene::new`] refuse.
 pub fn read_scene(folder: &Path, depth_range: Option<DepthRange>) -> Result<Scene> {
     let scene = SceneFolder::find(folder)?;
     if !scene.images.is_dir() {
@@ -77,8 +76,8 @@ pub fn read_scene(folder: &Path, depth_range: Option<DepthRange>) -> Result<Scen
     Scene::new(views, model.points)
 }
 
-/// Writes a scene as a folder: its photographs as PNG files under their views' names in `images/`, and a binary model in
-/// `sparse/`.
+/// Writes a scene as a folder: its photographs as PNG files under their views' names in `images/`, and a
+/// binary model in `sparse/`.
 ///
 /// # Errors
 /// A view whose name does not end in `.png` or leads out of the folder; a file that cannot be written.

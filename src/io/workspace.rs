@@ -13,38 +13,47 @@ use crate::fusion::PointCloud;
 use crate::geometry::Camera;
 use crate::image::Picture;
 use crate::pipeline::ViewResult;
-use crate::scene::Maps;
-use crate::scene::SparsePoint;
+use crate::scene::{Maps, SparsePoint};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Which of a view's maps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MapKind {
-    /// The raw estimate.
-    Photometric,
-    /// What was validated by other views.
-    Geometric,
+    /// The raw estimate of every pixel; "photometric" in COLMAP's file names.
+    Raw,
+    /// The validated pixels only; "geometric" in COLMAP's file names.
+    Validated,
 }
 
 impl MapKind {
-    /// Its name in file names.
-    pub fn name(self) -> &'static str {
+    /// COLMAP's word for it, which is part of file names.
+    pub fn colmap_name(self) -> &'static str {
         match self {
-            MapKind::Photometric => "photometric",
-            MapKind::Geometric => "geometric",
+            MapKind::Raw => "photometric",
+            MapKind::Validated => "geometric",
         }
     }
 }
 
-/// A dense folder. Views are called by their names in the model, which may contain folders.
+/// A dense folder. Views have the names of the model's images, which may contain folders.
+///
+/// # Examples
+/// ```
+/// use skep::io::{MapKind, Workspace};
+/// use std::path::Path;
+///
+/// let workspace = Workspace::new("dense");
+/// let map = workspace.depth_map("left/1.jpg", MapKind::Validated);
+/// assert_eq!(map, Path::new("dense/stereo/depth_maps/left/1.jpg.geometric.bin"));
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Workspace {
     folder: PathBuf,
 }
 
 impl Workspace {
-    /// The dense folder of this path; nothing is read or made yet.
+    /// The dense folder at this path; reads and creates nothing.
     pub fn new(folder: impl Into<PathBuf>) -> Workspace {
         Workspace { folder: folder.into() }
     }
@@ -80,47 +89,48 @@ impl Workspace {
     }
 
     fn map(&self, what: &str, name: &str, kind: MapKind) -> PathBuf {
-        self.folder.join("stereo").join(what).join(format!("{name}.{}.bin", kind.name()))
+        self.folder.join("stereo").join(what).join(format!("{name}.{}.bin", kind.colmap_name()))
     }
 
-    /// Refuses the name of a view whose files would lie outside the folder.
+    /// Refuses a view's name whose files would lie outside the folder.
     pub fn check_name(name: &str) -> Result<()> {
         if stays_inside(name) { Ok(()) } else { Err(Error::argument("view's name", name, NAME_INSIDE)) }
     }
 
-    /// Writes all files of one view: depth and normal map and consistency graph of the raw estimate (photometric) and
-    /// of what was validated (geometric), and previews of the latter.
+    /// Writes all files of one view: depth and normal map and consistency graph of the raw estimate
+    /// (photometric) and of what was validated (geometric), and previews of the latter.
     ///
     /// # Errors
     /// A name that would lead out of the folder; a file that cannot be written.
     pub fn write_view(&self, name: &str, camera: &Camera, result: &ViewResult) -> Result<()> {
         Workspace::check_name(name)?;
-        let filtered = result.validated();
-        self.write_maps(name, MapKind::Photometric, camera, &result.raw, result)?;
-        self.write_maps(name, MapKind::Geometric, camera, &filtered, result)?;
+        let validated = result.validated();
+        self.write_maps(name, MapKind::Raw, camera, &result.raw, result)?;
+        self.write_maps(name, MapKind::Validated, camera, &validated, result)?;
         let (width, height) = (camera.width, camera.height);
-        write_depth_preview(&self.preview(name, "depth"), width, height, &filtered.depth)?;
-        write_normal_preview(&self.preview(name, "normal"), width, height, &filtered.normal)?;
+        write_depth_preview(&self.preview(name, "depth"), width, height, &validated.depth)?;
+        write_normal_preview(&self.preview(name, "normal"), width, height, &validated.normal)?;
         write_views_preview(&self.preview(name, "views"), width, height, result.sources.len(), |pixel| {
-            if filtered.depth[pixel] > 0.0 { result.view_sets.count(pixel) } else { 0 }
+            if validated.depth[pixel] > 0.0 { result.view_sets.count(pixel) } else { 0 }
         })
     }
 
-    /// Writes `stereo/patch-match.cfg` and `stereo/fusion.cfg`, the lists of images without which COLMAP does not start.
+    /// Writes `stereo/patch-match.cfg` and `stereo/fusion.cfg`, the lists of images without which COLMAP does
+    /// not start.
     pub fn write_lists<'a>(&self, names: impl Iterator<Item = &'a str> + Clone) -> Result<()> {
         let stereo = self.folder.join("stereo");
         write_file(&stereo.join("fusion.cfg"), |out| {
             names.clone().try_for_each(|name| writeln!(out, "{name}"))
         })?;
-        // The second line lets COLMAP choose the source views itself.
+        // `__auto__` lets COLMAP choose the source views itself.
         write_file(&stereo.join("patch-match.cfg"), |out| {
             names.clone().try_for_each(|name| writeln!(out, "{name}\n__auto__, 20"))
         })
     }
 
-    /// Makes the folder a workspace that COLMAP reads: photographs and model of the scene beside the maps. The model is
-    /// copied, as tools change models in place; photographs are linked where the file system can, else copied. What is
-    /// there already stays.
+    /// Makes the folder a workspace that COLMAP reads: photographs and model of the scene beside the maps.
+    /// The model is copied, as tools change models in place; photographs are linked where the file system
+    /// can, else copied. What is there already stays.
     pub fn adopt(&self, scene: &SceneFolder) -> Result<()> {
         let is_new = |from: &Path, to: &Path| from.is_file() && !to.exists();
         for image in ColmapModel::read(&scene.sparse)?.images {
@@ -193,32 +203,29 @@ impl Workspace {
         Ok(Maps { depth, normal })
     }
 
-    /// The scene the workspace belongs to: its own `sparse/` (and `images/`), as COLMAP's workspaces have them, else
-    /// those of the folder above it.
+    /// The scene the workspace belongs to: its own `sparse/` (and `images/`), as COLMAP's workspaces have
+    /// them, else those of the folder above it.
     pub fn find_scene(&self) -> Result<SceneFolder> {
         let folder = self.folder.canonicalize().map_err(|error| cannot_be_read(&self.folder, error))?;
         SceneFolder::find(&folder).or_else(|own| match folder.parent() {
             Some(parent) => SceneFolder::find(parent).map_err(|_| {
                 let expected = "sparse/ with cameras.bin and images.bin, or cameras.txt and images.txt";
-                Error::file(
-                    &folder,
-                    format!(
-                        "no COLMAP model here or in the folder above; expected {expected} (or say where with --scene SCENE)"
-                    ),
-                )
+                let problem = format!("no COLMAP model here or in the folder above; expected {expected}");
+                Error::file(&folder, format!("{problem} (--scene SCENE names another folder)"))
             }),
             None => Err(own),
         })
     }
 
-    /// Reads the maps of all views of the scene, with cameras, pictures and points: the geometric maps when any view
-    /// has one, else the photometric ones, never a mixture.
+    /// Reads the maps of all views of the scene, with cameras, pictures and points: the geometric maps when
+    /// any view has one, else the photometric ones, never a mixture.
     ///
     /// # Errors
-    /// No view with maps; a map without its other half, damaged or of another size than its camera; a damaged picture.
+    /// No view with maps; a map without its other half, damaged or of another size than its camera; a damaged
+    /// picture.
     pub fn read(&self, scene: &SceneFolder) -> Result<WorkspaceMaps> {
         let ColmapModel { images, points } = ColmapModel::read(&scene.sparse)?;
-        let kinds = [MapKind::Geometric, MapKind::Photometric];
+        let kinds = [MapKind::Validated, MapKind::Raw];
         let has_map = |name: &str, kind| self.depth_map(name, kind).is_file();
         let Some(kind) =
             kinds.into_iter().find(|&kind| images.iter().any(|image| has_map(&image.name, kind)))
@@ -257,7 +264,7 @@ pub struct WorkspaceView {
     pub picture: Option<Picture>,
 }
 
-/// What a workspace holds for fusion.
+/// The maps of a workspace, for fusion.
 #[derive(Debug, Clone)]
 pub struct WorkspaceMaps {
     /// All views of the model in the order of its file.

@@ -1,13 +1,15 @@
 //! The command line from outside: what it prints, what it writes, how it ends.
 #![cfg(feature = "cli")]
 
+mod dump;
+#[cfg(unix)]
+mod interruption;
 mod layouts;
 
-use layouts::{check_cloud, check_maps, map};
+use layouts::{check_cloud, check_maps};
 use serde_json::Value;
 use skep::simd::SimdLevel;
 use std::fs;
-use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use tempfile::TempDir;
@@ -101,7 +103,7 @@ fn files(folder: &Path) -> Vec<(PathBuf, u64)> {
 }
 
 #[test]
-fn info_tells_version_machine_and_every_option_of_both_presets() {
+fn info_tells_version_machine_and_every_option_of_the_presets() {
     let output = skep(&["info"]);
     assert!(output.status.success());
     let printed = text(&output.stdout);
@@ -256,8 +258,8 @@ fn parts_of_the_method_can_be_left_out_quietly() {
     assert_eq!(option("schedule.scales"), schedule);
 }
 
-/// README's first command, on a copy: every promised file with its layout, the report, then the cloud again from the
-/// maps alone.
+/// README's first command, on a copy: every promised file with its layout, the report, then the cloud again
+/// from the maps alone.
 #[test]
 fn the_embedded_scene_end_to_end() {
     let repository = files(&board());
@@ -314,8 +316,9 @@ fn check_report(report: &Value) {
         let sum: u64 = views.iter().map(|view| view[field].as_u64().unwrap()).sum();
         assert_eq!(totals[field], sum, "{field}");
     }
-    for outcomes in [&totals["outcomes"], &views[0]["outcomes"]] {
-        assert_eq!(outcomes.as_object().unwrap().len(), skep::PixelStatus::ALL.len());
+    for part in [totals, &views[0]] {
+        assert_eq!(part["outcomes"].as_object().unwrap().len(), skep::PixelStatus::ALL.len());
+        assert_eq!(part["outcomes"], part["status_counts"]);
     }
     let outcomes = totals["outcomes"].as_object().unwrap().values();
     assert_eq!(totals["pixels"], outcomes.map(|count| count.as_u64().unwrap()).sum::<u64>());
@@ -326,7 +329,7 @@ fn check_report(report: &Value) {
         (&report["version"], &report["preset"]),
         (&env!("CARGO_PKG_VERSION").into(), &"default".into())
     );
-    assert!(["scalar", "base", "v3"].contains(&report["simd"].as_str().unwrap()));
+    assert!(["scalar", "baseline", "v3"].contains(&report["simd"].as_str().unwrap()));
     assert_eq!(report["options"].as_object().unwrap().len(), skep::Options::default().values().count());
     assert!(report["threads"].as_u64() > Some(0) && report["warnings"].is_array());
 }
@@ -348,57 +351,4 @@ fn check_lines(printed: &str) {
     assert!(steps.contains(&"fusion"), "{printed}");
     assert!(steps.windows(2).all(|pair| pair[0] != pair[1]), "a step is announced once:\n{printed}");
     assert!(!printed.contains('\r') && !printed.contains('\u{1b}'), "no bar without a terminal:\n{printed}");
-}
-
-/// Starts a run and sends it a signal once a line of its progress begins with `cue`; gives its exit status and what it
-/// printed after the cue.
-#[cfg(unix)]
-fn interrupted(arguments: &[&str], cue: &str, signal: &str) -> (Option<i32>, String) {
-    let mut process = command(arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-    let mut lines = BufReader::new(process.stderr.take().unwrap()).lines().map(|line| line.unwrap());
-    assert!(lines.by_ref().any(|line| line.starts_with(cue)), "no line begins with {cue}");
-    let sent = Command::new("kill").args([signal, &process.id().to_string()]).status().unwrap();
-    assert!(sent.success());
-    let printed = lines.collect::<Vec<_>>().join("\n");
-    (process.wait().unwrap().code(), printed)
-}
-
-#[cfg(unix)]
-#[test]
-fn ctrl_c_and_sigterm_during_the_search_leave_everything_as_it_was() {
-    let output = TempDir::new().unwrap();
-    let earlier = output.path().join("report.json");
-    for signal in ["-INT", "-TERM"] {
-        fs::write(&earlier, "of an earlier run").unwrap();
-        let board = board();
-        let arguments = ["reconstruct", board.to_str().unwrap(), "--output", path(&output)];
-        let (status, printed) = interrupted(&arguments, "search", signal);
-        assert_eq!(status, Some(130), "{printed}");
-        assert!(printed.contains("interrupted: nothing was written"), "{printed}");
-        assert_eq!(files(output.path()), [(earlier.clone(), 17)]);
-    }
-}
-
-#[cfg(unix)]
-#[test]
-fn ctrl_c_during_the_writing_leaves_whole_files() {
-    let scene = small_board();
-    let (status, printed) = interrupted(&["reconstruct", path(&scene)], "writing", "-INT");
-    let dense = scene.path().join("dense");
-    // The writing of so little may be over before the signal arrives.
-    let finished = status == Some(0);
-    assert!(finished || status == Some(130) && printed.contains("whole"), "{status:?} {printed}");
-    assert_eq!(finished, dense.join("report.json").exists(), "a report stands beside finished runs only");
-    let stereo = dense.join("stereo");
-    // It may also arrive before the first file.
-    let written = if stereo.exists() { files(&stereo) } else { Vec::new() };
-    for (path, _) in written.into_iter().filter(|(path, _)| path.extension().is_some_and(|e| e == "bin")) {
-        let channels = match path.components().any(|part| part.as_os_str() == "normal_maps") {
-            true => 3,
-            false => 1,
-        };
-        let is_graph = path.components().any(|part| part.as_os_str() == "consistency_graphs");
-        let whole = is_graph || map(&path, WIDTH / 4, HEIGHT / 4, channels).is_some();
-        assert!(whole, "{} is not whole", path.display());
-    }
 }

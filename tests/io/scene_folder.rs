@@ -63,7 +63,7 @@ fn what_is_missing_is_named() {
     assert_refused(read_scene(folder.path(), None), &["images", "no such folder"]);
     write_pictures(folder.path(), &model());
     std::fs::remove_file(folder.path().join("images/cam 1/right side.png")).unwrap();
-    assert_refused(read_scene(folder.path(), None), &["cam 1/right side.png", "missing", "sparse"]);
+    assert_refused(read_scene(folder.path(), None), &["cam 1/right side.png", "no such file", "sparse"]);
 }
 
 #[test]

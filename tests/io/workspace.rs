@@ -11,8 +11,8 @@ use skep::{Counts, Maps, PixelStatus, PointCloud, PointViews, ViewResult};
 use std::path::Path;
 use tempfile::{TempDir, tempdir};
 
-/// A result of 6 x 4 pixels: pixel 3 is validated, pixel 4 inconsistent, the others masked. Its sources are the views
-/// 5 and 2 of the scene, both used by pixel 3, the second by pixel 4.
+/// A result of 6 x 4 pixels: pixel 3 is validated, pixel 4 inconsistent, the others masked. Its sources are
+/// the views 5 and 2 of the scene, both used by pixel 3, the second by pixel 4.
 fn result() -> ViewResult {
     let mut result = ViewResult {
         width: 6,
@@ -60,9 +60,9 @@ fn a_view_is_written_as_colmap_lays_it_out() {
     ] {
         assert!(workspace.folder().join(file).is_file(), "{file}");
     }
-    let raw = workspace.read_maps(NAME, MapKind::Photometric, &camera(0.0)).unwrap();
+    let raw = workspace.read_maps(NAME, MapKind::Raw, &camera(0.0)).unwrap();
     assert_eq!(raw, result().raw);
-    let validated = workspace.read_maps(NAME, MapKind::Geometric, &camera(0.0)).unwrap();
+    let validated = workspace.read_maps(NAME, MapKind::Validated, &camera(0.0)).unwrap();
     assert_eq!(validated, result().validated());
     assert_eq!((validated.depth[3], validated.depth[4]), (3.0, 0.0));
 }
@@ -72,10 +72,10 @@ fn consistency_graphs_name_the_views_of_the_scene() {
     let (_folder, workspace) = scene();
     workspace.write_view(NAME, &camera(0.0), &result()).unwrap();
     let graph = |kind| read_consistency_graph(&workspace.consistency_graph(NAME, kind)).unwrap();
-    let raw = graph(MapKind::Photometric);
+    let raw = graph(MapKind::Raw);
     assert_eq!(raw.pixels, [[3, 0], [4, 0]]);
     assert_eq!((raw.views.get(0), raw.views.get(1)), ([5, 2].as_slice(), [2].as_slice()));
-    assert_eq!(graph(MapKind::Geometric).pixels, [[3, 0]], "only what was validated");
+    assert_eq!(graph(MapKind::Validated).pixels, [[3, 0]], "only what was validated");
 }
 
 #[test]
@@ -97,10 +97,10 @@ fn a_cloud_is_written_with_its_visibility_beside_it() {
 #[test]
 fn maps_that_do_not_fit_are_refused() {
     let (_folder, workspace) = scene();
-    let read = |camera| workspace.read_maps("a.png", MapKind::Geometric, &camera);
+    let read = |camera| workspace.read_maps("a.png", MapKind::Validated, &camera);
     assert_refused(read(camera(0.0)), &["depth_maps", "a.png.geometric.bin", "cannot be read"]);
     let (depth, normal) =
-        (workspace.depth_map("a.png", MapKind::Geometric), workspace.normal_map("a.png", MapKind::Geometric));
+        (workspace.depth_map("a.png", MapKind::Validated), workspace.normal_map("a.png", MapKind::Validated));
     write_depth_map(&depth, 6, 4, &[1.0; 24]).unwrap();
     assert_refused(read(camera(0.0)), &["normal_maps", "cannot be read"]);
     write_normal_map(&normal, 4, 6, &[[0.0, 0.0, -1.0]; 24]).unwrap();
@@ -134,7 +134,7 @@ fn all_maps_of_a_workspace_are_read_and_missing_ones_named() {
     let maps = workspace.read(&found).unwrap();
     assert_eq!(
         (maps.kind, maps.missing.as_slice()),
-        (MapKind::Geometric, ["left.png".to_owned()].as_slice())
+        (MapKind::Validated, ["left.png".to_owned()].as_slice())
     );
     assert_eq!(maps.views[0].maps.depth, [0.0; 24], "views keep their places in the file");
     assert!(maps.views[0].picture.is_none());
@@ -142,9 +142,9 @@ fn all_maps_of_a_workspace_are_read_and_missing_ones_named() {
     assert_eq!(maps.views[1].picture.as_ref().unwrap().rgb(0), [1, 50, 60]);
     assert_eq!(maps.points.len(), 3);
 
-    std::fs::remove_file(workspace.depth_map(NAME, MapKind::Geometric)).unwrap();
+    std::fs::remove_file(workspace.depth_map(NAME, MapKind::Validated)).unwrap();
     let maps = workspace.read(&found).unwrap();
-    assert_eq!((maps.kind, &maps.views[1].maps), (MapKind::Photometric, &result().raw));
+    assert_eq!((maps.kind, &maps.views[1].maps), (MapKind::Raw, &result().raw));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! The words of the command line and the help that teaches them.
+//! The arguments of the command line, and their help.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use skep::{DepthRange, Options, Result};
@@ -16,7 +16,7 @@ pub enum Command {
     /// Estimate depth, normal and source-view maps of a scene and fuse them into a cloud
     #[command(after_help = RECONSTRUCT_HELP)]
     Reconstruct(Reconstruct),
-    /// Fuse depth and normal maps that are already there, from skep or from COLMAP
+    /// Fuse existing depth and normal maps, of skep or of COLMAP, into a cloud
     #[command(after_help = FUSE_HELP)]
     Fuse(Fuse),
     /// Show version, instruction set, threads and every option of the presets, or explain one option
@@ -27,33 +27,37 @@ pub enum Command {
 pub struct Reconstruct {
     /// Folder with images/ and a COLMAP model in sparse/ or sparse/0/
     pub scene: PathBuf,
-    /// Where the results go [default: SCENE/dense]
+    /// Folder of the results [default: SCENE/dense]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// default measures best; fast takes less than half of its time; paper follows the paper to the letter and
-    /// takes its own
+    /// Set of option values to start from: default has the best quality; fast takes less than half of its
+    /// time; paper follows the paper to the letter and is slow
     #[arg(long, default_value = "default", value_parser = Options::PRESETS)]
     pub preset: String,
-    /// Worker threads; 0 takes one for each core. The result does not depend on it
+    /// Worker threads; 0 uses one for each core. The result does not depend on it
     #[arg(short, long, value_name = "N", default_value_t = 0)]
     threads: usize,
     /// Seed of the random generator; the same seed gives the same result
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Depths to search in every view, in the model's units, instead of those of the sparse points
+    /// Depth range to search in every view, in units of the model, instead of that of the sparse points
     #[arg(long, num_args = 2, value_names = ["MIN", "MAX"], allow_negative_numbers = true)]
     depth_range: Option<Vec<f64>>,
-    /// Leave parts of the method out, separated by commas
+    /// Parts of the method to leave out, separated by commas
     #[arg(long, value_name = "PARTS", value_delimiter = ',')]
     without: Vec<Part>,
-    /// Set an option of the preset; `skep info` lists names and values, `skep info NAME` explains one. May be repeated
+    /// Set an option of the preset; `skep info` lists names and values, `skep info NAME` explains one. May be
+    /// repeated
     #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
     set: Vec<(String, String)>,
-    /// Scales to search instead of the preset's, from coarse to fine, the last at full size, such as 'downscale=2
-    /// food_sources=3 iterations=5+4x1; downscale=1 food_sources=2 iterations=1+2x1': half size with 3 food sources a
-    /// pixel, 5 iterations in the first cycle and 4 more cycles of 1, then full size
+    /// Scales to search instead of the preset's, from coarse to fine, the last at full size, such as
+    /// 'downscale=2 food_sources=3 iterations=5+4x1; downscale=1 food_sources=2 iterations=1+2x1': half size
+    /// with 3 food sources a pixel, 5 iterations in the first cycle and 4 more cycles of 1, then full size
     #[arg(long, value_name = "SCALES")]
     schedule: Option<String>,
+    /// Also write the maps of every cycle as pictures into DIR, to study the method; slower, same result
+    #[arg(long, value_name = "DIR")]
+    pub dump: Option<PathBuf>,
     /// Print warnings and errors only
     #[arg(short, long)]
     pub quiet: bool,
@@ -68,17 +72,17 @@ fn setting(text: &str) -> std::result::Result<(String, String), String> {
 /// A part of the method that can be left out.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Part {
-    /// Incidence and visibility do not refine the view set of a pixel
+    /// The view set of a pixel is not refined by incidence and visibility
     ViewSelection,
-    /// Planes of validated neighbors are not favored
+    /// Planes of validated neighbors get no reward
     Reward,
-    /// Consistent solutions are not offered to other views
+    /// Consistent planes are not propagated to other views
     Propagation,
 }
 
 #[derive(Args)]
 pub struct Info {
-    /// An option, with or without its group
+    /// Option to explain, with or without its group, such as check.depth_tolerance
     pub option: Option<String>,
 }
 
@@ -86,10 +90,10 @@ pub struct Info {
 pub struct Fuse {
     /// Folder that holds stereo/depth_maps and stereo/normal_maps
     pub workspace: PathBuf,
-    /// Folder with images/ and sparse/ that the maps belong to [default: WORKSPACE itself or the folder above]
+    /// Folder with images/ and sparse/ that the maps belong to [default: WORKSPACE or the folder above it]
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
-    /// Where the cloud goes [default: WORKSPACE/fused.ply]
+    /// File of the cloud [default: WORKSPACE/fused.ply]
     #[arg(short, long, value_name = "FILE.ply")]
     output: Option<PathBuf>,
     /// Print warnings and errors only
@@ -103,7 +107,7 @@ impl Reconstruct {
         self.output.clone().unwrap_or_else(|| self.scene.join("dense"))
     }
 
-    /// The preset with what the other arguments change in it.
+    /// The preset, as changed by the other arguments.
     pub fn options(&self) -> Result<Options> {
         let mut options = Options::preset(&self.preset)?;
         options.threads = self.threads;
@@ -124,7 +128,7 @@ impl Reconstruct {
         Ok(options)
     }
 
-    /// The depth range given by hand.
+    /// The depth range of `--depth-range`, checked.
     pub fn depth_range(&self) -> Result<Option<DepthRange>> {
         let Some(&[near, far]) = self.depth_range.as_deref() else { return Ok(None) };
         let range = DepthRange { near, far };
@@ -143,7 +147,9 @@ impl Fuse {
 const EXAMPLES: &str = "\
 Examples:
   skep reconstruct SCENE            maps and cloud of a scene, into SCENE/dense
-  skep fuse SCENE/dense             the cloud again, from the maps that are there
+  skep fuse SCENE/dense             the cloud again, from existing maps
+  skep info                         the options and their values in the presets
+  skep info sigma_color             what one option does
   skep help reconstruct             what the files are, and what to do when it fails
 
 Exit status: 0 done, 1 failed, 2 wrong arguments, 130 interrupted (Ctrl-C).";
@@ -155,35 +161,41 @@ The scene:
   This is what `colmap image_undistorter` writes; run it first when lenses distort:
     colmap image_undistorter --image_path IMAGES --input_path MODEL --output_path SCENE
 
-What it makes, in COLMAP's layouts:
+Results, in COLMAP's layouts:
   fused.ply                        the cloud: position, normal, color
-  fused.ply.vis                    the views each point was seen in
+  fused.ply.vis                    the views each point was fused from
   preview/NAME.depth.png           pictures to look at first: depth, normal and number of
-          NAME.normal.png          source views of each pixel; black where nothing was found
+          NAME.normal.png          source views of each pixel; black where nothing was validated
           NAME.views.png
   stereo/depth_maps/NAME.photometric.bin    the raw estimate of every pixel
-  stereo/depth_maps/NAME.geometric.bin      only what other views confirm
-  stereo/normal_maps, stereo/consistency_graphs    likewise: normals, and source views of each pixel
-  images, sparse                   the scene again: the folder is a workspace of COLMAP's, so that
-                                   `colmap stereo_fusion --workspace_path DIR ...` takes it as it is
+  stereo/depth_maps/NAME.geometric.bin      the validated pixels only
+  stereo/normal_maps, stereo/consistency_graphs    likewise: normals, and the view set of each pixel
+  images, sparse                   the scene again: the folder is a COLMAP workspace, so that
+                                   `colmap stereo_fusion --workspace_path DIR ...` reads it as it is
   report.json                      counts, times and options; written last
 
 Examples:
   skep reconstruct SCENE --output RESULT --threads 4
   skep reconstruct SCENE --depth-range 0.5 12
   skep reconstruct SCENE --preset paper --without reward,propagation
+  skep reconstruct SCENE --set geom_consistency_max_error=0.03 --set fill_gaps=false
+  skep reconstruct SCENE --dump CYCLES   CYCLES/00-size2-cycle1/NAME.depth.png, .normal.png and
+                                         .validated.png (white: validated), and so on
 
 When it fails:
   no sparse points: give --depth-range MIN MAX, or triangulate points:
     colmap point_triangulator --database_path DATABASE --image_path IMAGES \\
       --input_path MODEL --output_path SCENE/sparse
-  an empty or thin cloud: the last lines say why pixels were dropped, report.json says it for each
-    view; preview/NAME.views.png shows where too few views see the surface.";
+  an empty or thin cloud: the last lines say why pixels were dropped, report.json for each view;
+    preview/NAME.views.png shows where too few views see the surface.
+  surfaces missing at one distance: the depth range does not reach them; depth_min and depth_max in
+    report.json are what was searched, --depth-range MIN MAX sets them.";
 
 const FUSE_HELP: &str = "\
-The workspace is what `skep reconstruct` or `colmap patch_match_stereo` leaves: stereo/depth_maps and
-stereo/normal_maps. The scene it was made from, images/ and sparse/, is looked for in WORKSPACE and in
-the folder above it. FILE.ply.vis, the views of each point, is written beside FILE.ply.
+The workspace is what `skep reconstruct` or `colmap patch_match_stereo` writes: stereo/depth_maps and
+stereo/normal_maps. Its scene, images/ and sparse/, is searched in WORKSPACE and in the folder above it.
+The geometric (validated) maps are fused if any view has one, else the photometric (raw) ones.
+FILE.ply.vis, the views of each point, is written beside FILE.ply.
 
 Examples:
   skep fuse SCENE/dense

@@ -1,4 +1,4 @@
-//! `skep fuse`: the cloud from maps that are already there.
+//! `skep fuse`: the cloud from existing maps.
 
 use crate::arguments::Fuse;
 use crate::interrupt::Interrupt;
@@ -23,7 +23,7 @@ pub fn run(arguments: &Fuse) -> Result<(), Failure> {
         streams::warning(&format!(
             "{} views have no {} maps: {missing}",
             maps.missing.len(),
-            maps.kind.name()
+            maps.kind.colmap_name()
         ));
     }
 
@@ -31,7 +31,7 @@ pub fn run(arguments: &Fuse) -> Result<(), Failure> {
     let output = arguments.output();
     let cloud = fuse_maps(&maps, display, &interrupt).inspect_err(|error| {
         if *error == Error::Cancelled {
-            streams::notice(&format!("interrupted: {} is as it was", output.display()));
+            streams::notice(&format!("interrupted: {} was not written", output.display()));
         }
     })?;
     Workspace::write_cloud(&output, &cloud)?;
@@ -58,21 +58,21 @@ fn fuse_maps(maps: &WorkspaceMaps, display: Display, interrupt: &Interrupt) -> s
         })
         .collect();
     let follower = display.follow();
-    let hook = |progress: &Progress| {
+    let progress = |progress: &Progress| {
         follower.show(progress);
         interrupt.control_flow()
     };
-    let cloud = fuse(&views, &Options::default().fusion, &hook)?;
+    let cloud = fuse(&views, &Options::default().fusion, &progress)?;
     interrupt.check().map(|()| cloud)
 }
 
-/// What was fused and, when the cloud is empty, what may be the reason.
+/// What was fused and, when the cloud is empty, the likely reason.
 fn summary(maps: &WorkspaceMaps, cloud: &PointCloud) -> Vec<String> {
     let pixels: usize = maps.views.iter().map(|view| view.maps.depth.len()).sum();
     let depths =
         |view: &skep::io::WorkspaceView| view.maps.depth.iter().filter(|&&depth| depth > 0.0).count();
     let estimated: usize = maps.views.iter().map(depths).sum();
-    let kind = maps.kind.name();
+    let kind = maps.kind.colmap_name();
     let mut lines = vec![format!("{estimated} depths of {pixels} pixels in the {kind} maps")];
     if cloud.positions.is_empty() {
         let others = Options::default().fusion.min_views;

@@ -1,4 +1,4 @@
-//! `skep info`: what this build and machine offer, what the presets hold, and what each option does.
+//! `skep info`: version, SIMD level, the options with their values in the presets, and what each option does.
 
 use crate::arguments::Info;
 use crate::{Failure, streams};
@@ -16,7 +16,7 @@ pub fn run(arguments: &Info) -> Result<(), Failure> {
     }
 }
 
-/// The threads that `--threads 0` takes.
+/// The number of threads of `--threads 0`.
 pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
@@ -42,7 +42,7 @@ fn explain(name: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A row for each option, a column for each preset; a value of several parts takes a line for each.
+/// A row for each option, a column for each preset; each scale of a schedule is on a line of its own.
 fn preset_table() -> Vec<String> {
     let presets =
         Options::PRESETS.map(|name| Options::preset(name).expect("presets are found by their names"));

@@ -1,4 +1,4 @@
-//! Ctrl-C and its kin: a flag that long work looks at.
+//! Ctrl-C, SIGTERM and SIGHUP: a flag that long work reads.
 
 use crate::streams;
 use skep::{Error, Result};
@@ -10,25 +10,25 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
-    /// From here on Ctrl-C, SIGTERM and SIGHUP raise the flag. Before, they end the process at once, which is right
-    /// as long as there is nothing to keep.
+    /// From here on Ctrl-C, SIGTERM and SIGHUP raise the flag. Before, they end the process at once, which is
+    /// right as long as nothing was written.
     pub fn watch() -> Interrupt {
         let raised = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&raised);
-        // Without a handler the signals end the process between any two instructions; files are whole even then,
-        // because they are renamed into place.
+        // Without a handler the signals end the process between any two instructions; files are whole even
+        // then, because they are renamed into place.
         if let Err(error) = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)) {
-            streams::warning(&format!("Ctrl-C will end the run without a word: {error}"));
+            streams::warning(&format!("Ctrl-C will end the run at once, without a message: {error}"));
         }
         Interrupt(raised)
     }
 
-    /// What a progress hook answers.
+    /// What a progress function returns.
     pub fn control_flow(&self) -> ControlFlow<()> {
         if self.0.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    /// Ends a sequence of steps once the flag is up.
+    /// [`Error::Cancelled`] once the flag is raised.
     pub fn check(&self) -> Result<()> {
         match self.control_flow() {
             ControlFlow::Continue(()) => Ok(()),

@@ -1,6 +1,7 @@
 //! The command line.
 
 mod arguments;
+mod dump;
 mod fuse;
 mod info;
 mod interrupt;
@@ -15,20 +16,20 @@ use clap::Parser;
 use skep::Error;
 use std::process::ExitCode;
 
-/// Failed for a reason that was printed.
+/// Exit status: failed for a reason that was printed.
 const FAILED: u8 = 1;
-/// The arguments make no sense; also clap's own status.
+/// Exit status: wrong arguments; the same as clap's.
 const USAGE: u8 = 2;
-/// Stopped by the user, as shells report it: 128 + SIGINT.
+/// Exit status: stopped by the user, as shells report it: 128 + SIGINT.
 const INTERRUPTED: u8 = 130;
 
 fn main() -> ExitCode {
-    let outcome = match Arguments::parse().command {
+    let result = match Arguments::parse().command {
         Command::Reconstruct(arguments) => reconstruct::run(&arguments),
         Command::Fuse(arguments) => fuse::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
     };
-    match outcome {
+    match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(Failure::Usage(error)) => fail(&error, USAGE),
         Err(Failure::Run(Error::Cancelled)) => ExitCode::from(INTERRUPTED),
@@ -41,11 +42,11 @@ fn fail(error: &Error, status: u8) -> ExitCode {
     ExitCode::from(status)
 }
 
-/// Why a command did not do what it was asked.
+/// Why a command failed.
 enum Failure {
-    /// An argument makes no sense.
+    /// An argument is wrong.
     Usage(Error),
-    /// The run went wrong or was interrupted.
+    /// The run failed or was interrupted.
     Run(Error),
 }
 

@@ -1,4 +1,4 @@
-//! How a run shows where it stands: a bar on a terminal, plain lines elsewhere, on standard error.
+//! Progress on standard error: a bar on a terminal, plain lines elsewhere.
 
 use crate::streams;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -9,10 +9,10 @@ use std::time::{Duration, Instant};
 
 /// Steps of the bar; finer ones could not be seen.
 const BAR_STEPS: f64 = 1000.0;
-/// Share of the run under which the time that is left would be a guess.
+/// Fraction of the run below which the remaining time would be a guess.
 const FIRST_ESTIMATE: f64 = 0.01;
 
-/// The style that suits whoever watches.
+/// How progress is shown.
 #[derive(Clone, Copy)]
 pub enum Display {
     Silent,
@@ -20,7 +20,7 @@ pub enum Display {
     Bar,
 }
 
-/// Shows the progress of one piece of work; its bar goes when it is dropped, its lines stay.
+/// Shows the progress of one piece of work; dropping it removes the bar, lines stay.
 pub struct Follower {
     display: Display,
     bar: ProgressBar,
@@ -28,7 +28,7 @@ pub struct Follower {
     last: Mutex<Option<Shown>>,
 }
 
-/// What was shown last: nothing is drawn again unless it changed.
+/// What was shown last: only changes are drawn.
 #[derive(Clone, Copy, PartialEq)]
 struct Shown {
     step: (Phase, u32, u32),
@@ -46,7 +46,7 @@ impl Display {
         }
     }
 
-    /// A line about what is not followed step by step.
+    /// Prints a line about work without progress of its own.
     pub fn say(self, line: &str) {
         match self {
             Display::Silent => (),
@@ -54,7 +54,7 @@ impl Display {
         }
     }
 
-    /// Begins to follow a piece of work; the time that is left is told from here.
+    /// Starts a piece of work; the remaining time is estimated from here.
     pub fn follow(self) -> Follower {
         let bar = match self {
             Display::Silent | Display::Lines => ProgressBar::hidden(),
@@ -65,8 +65,8 @@ impl Display {
 }
 
 impl Follower {
-    /// Shows where the work stands. Called from any thread, and quick: a thread that is showing right now is not
-    /// waited for.
+    /// Shows the progress. May be called from any thread; skipped while another thread is drawing, so that
+    /// workers never wait.
     pub fn show(&self, progress: &Progress) {
         let Ok(mut last) = self.last.try_lock() else { return };
         let shown = Shown {
@@ -74,7 +74,7 @@ impl Follower {
             view: progress.view,
             bar_steps: (progress.done * BAR_STEPS) as u64,
         };
-        // A thread that was overtaken has nothing new to say.
+        // A later call may have drawn already: the bar never moves back.
         if last.is_some_and(|last| last == shown || shown.bar_steps < last.bar_steps) {
             return;
         }
@@ -103,13 +103,13 @@ fn bar() -> ProgressBar {
     ProgressBar::with_draw_target(Some(BAR_STEPS as u64), ProgressDrawTarget::stderr()).with_style(style)
 }
 
-/// What is beside the bar, for example `search at 1/2 size, cycle 1, view 3 of 7, 0:41 left`.
+/// The text beside the bar, for example `search at 1/2 size, cycle 1, view 3 of 7, 0:41 left`.
 fn message(progress: &Progress, elapsed: Duration) -> String {
     let view = format!("view {} of {}", progress.view + 1, progress.views);
     format!("{}, {view}{}", step(progress), left(progress.done, elapsed))
 }
 
-/// A line of its own, for example `search at full size, cycle 1, 7 views: 62 % done, 0:41 left`.
+/// A line without a bar, for example `search at full size, cycle 1, 7 views: 62 % done, 0:41 left`.
 fn line(progress: &Progress, elapsed: Duration) -> String {
     let percent = (progress.done * 100.0) as u32;
     let left = left(progress.done, elapsed);
@@ -125,7 +125,7 @@ fn step(progress: &Progress) -> String {
     }
 }
 
-/// `, 0:41 left`, or nothing as long as there is nothing to tell it from.
+/// `, 0:41 left`, or nothing while too little is done for an estimate.
 fn left(done: f64, elapsed: Duration) -> String {
     if done < FIRST_ESTIMATE {
         return String::new();
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_speaks_of_all_views() {
+    fn a_line_counts_all_views() {
         let progress = Progress { phase: Phase::Fusion, ..QUARTER_DONE };
         assert_eq!(line(&progress, Duration::from_secs(10)), "fusion, 7 views: 25 % done, 0:30 left");
     }

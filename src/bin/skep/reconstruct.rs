@@ -1,6 +1,7 @@
 //! `skep reconstruct`: a scene folder in, maps, previews, cloud and report out.
 
 use crate::arguments::Reconstruct;
+use crate::dump;
 use crate::interrupt::Interrupt;
 use crate::progress::Display;
 use crate::report::{Report, Totals};
@@ -8,7 +9,7 @@ use crate::stopwatch::{Stage, Stopwatch};
 use crate::{Failure, streams};
 use rayon::prelude::*;
 use skep::io::{SceneFolder, Workspace, read_scene};
-use skep::{Error, Options, PixelStatus, Progress, Reconstruction, Result, Scene};
+use skep::{Error, PixelStatus, Progress, ProgressFn, Reconstruction, Result, Scene};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -25,10 +26,23 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
     display.say(&format!("reading {}", arguments.scene.display()));
     let scene = read_scene(&arguments.scene, depth_range)?;
     require_writable(&output)?;
+    if let Some(folder) = &arguments.dump {
+        require_writable(folder)?;
+    }
 
     let interrupt = Interrupt::watch();
-    let result = solve(&scene, &options, display, &stopwatch, &interrupt)
-        .inspect_err(|error| explain_interruption(error, "nothing was written"))?;
+    let estimate = |progress: ProgressFn| match &arguments.dump {
+        Some(folder) => {
+            pool(options.threads)?.install(|| dump::reconstruct(&scene, &options, folder, progress))
+        }
+        None => skep::reconstruct(&scene, &options, progress),
+    };
+    let kept = match &arguments.dump {
+        Some(_) => "the pictures of the finished cycles are whole, nothing else was written",
+        None => "nothing was written",
+    };
+    let result = followed(&estimate, display, &stopwatch, &interrupt)
+        .inspect_err(|error| explain_interruption(error, kept))?;
     result.warnings.iter().for_each(|warning| streams::warning(warning));
 
     let mut stopwatch = stopwatch.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -46,30 +60,30 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
     Ok(())
 }
 
-/// Estimates and fuses, timed and shown, until it is done or interrupted.
-fn solve(
-    scene: &Scene,
-    options: &Options,
+/// Estimates and fuses, timed and with its progress shown, until it is done or interrupted.
+fn followed(
+    estimate: &dyn Fn(ProgressFn) -> Result<Reconstruction>,
     display: Display,
     stopwatch: &Mutex<Stopwatch>,
     interrupt: &Interrupt,
 ) -> Result<Reconstruction> {
     let follower = display.follow();
-    let hook = |progress: &Progress| {
+    let progress = |progress: &Progress| {
         stopwatch.lock().unwrap_or_else(PoisonError::into_inner).enter(progress.phase.into());
         follower.show(progress);
         interrupt.control_flow()
     };
-    skep::reconstruct(scene, options, &hook)
+    estimate(&progress)
 }
 
-/// Finds out before hours of work whether the results can be written.
+/// Fails before hours of work when the results could not be written.
 fn require_writable(folder: &Path) -> Result<()> {
     let attempt = std::fs::create_dir_all(folder).and_then(|()| tempfile::tempfile_in(folder));
     attempt.map(drop).map_err(|error| Error::file(folder, format!("cannot be written to: {error}")))
 }
 
-/// Writes every file, the report excepted, on the threads of the current pool; stops between two views when interrupted.
+/// Writes every file, the report excepted, on the threads of the current pool; stops between two views when
+/// interrupted.
 fn write(
     output: &Path,
     folder: &Path,
@@ -77,7 +91,8 @@ fn write(
     result: &Reconstruction,
     interrupt: &Interrupt,
 ) -> Result<()> {
-    // A report says that everything beside it is there and belongs together: an older one must not say so meanwhile.
+    // A report means that everything beside it is complete and belongs together: an older one has to go
+    // first.
     let report = report_path(output);
     match std::fs::remove_file(&report) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
@@ -106,9 +121,9 @@ fn write(
     Workspace::write_cloud(&workspace.cloud(), &result.points)
 }
 
-/// Threads for what the library has no part in; 0 takes one for each core. Started when the library's threads have ended,
-/// they take over the memory that those have freed. Hours of work are not lost where no thread can be started: the
-/// current one does all of it then.
+/// Threads for work outside the library; 0 makes one for each core. For writing they are started after the
+/// library's threads ended and reuse the memory that those freed. Where no thread can be started the current
+/// one does the work: hours of estimation are not lost.
 fn pool(threads: usize) -> Result<rayon::ThreadPool> {
     let expected = "a number of threads that the system can start";
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
@@ -120,14 +135,14 @@ fn report_path(output: &Path) -> PathBuf {
     output.join("report.json")
 }
 
-/// Says what an interruption leaves behind. Other errors speak for themselves.
+/// Says what an interruption leaves behind. Other errors carry their own text.
 fn explain_interruption(error: &Error, kept: &str) {
     if *error == Error::Cancelled {
         streams::notice(&format!("interrupted: {kept}"));
     }
 }
 
-/// The last lines: what was made and where to look first, or why there is nothing to see.
+/// The last lines: what was written and where to look first, or why the cloud is empty.
 fn summary(output: &Path, scene: &Scene, totals: &Totals) -> Vec<String> {
     let workspace = Workspace::new(output);
     let validated = share(totals, PixelStatus::Validated);
@@ -148,27 +163,27 @@ fn summary(output: &Path, scene: &Scene, totals: &Totals) -> Vec<String> {
 
 /// Why the cloud is empty: how many pixels were dropped for which reason, and what would help.
 fn reasons(totals: &Totals) -> Vec<String> {
-    let help = |outcome| match outcome {
+    let help = |status| match status {
         PixelStatus::Validated => {
-            "confirmed, but in fewer views than fusion asks for: more views of each surface"
+            "validated, but confirmed by fewer views than fusion needs: more views of each surface"
         }
-        PixelStatus::Masked => "left out by their mask",
-        PixelStatus::NoTexture => "too uniform to be matched: more texture or light",
+        PixelStatus::Masked => "excluded by a mask",
+        PixelStatus::NoTexture => "too uniform to be matched: more texture or more light",
         PixelStatus::NoSources => "seen by fewer than two other views: more overlap between photographs",
         PixelStatus::Inconsistent => "other views disagree: check the calibration and that nothing moved",
-        PixelStatus::OutOfRange => "at an end of the depth range: try --depth-range MIN MAX with a wider one",
+        PixelStatus::OutOfRange => "at an end of the depth range: widen it with --depth-range MIN MAX",
     };
-    let mut lines = vec!["the cloud is empty; what became of the pixels:".to_owned()];
-    for outcome in PixelStatus::ALL.into_iter().filter(|outcome| totals.outcomes[outcome.name()] > 0) {
-        let (name, share) = (outcome.name(), share(totals, outcome));
-        lines.push(format!("  {} ({share:.1} %) {name}: {}", totals.outcomes[name], help(outcome)));
+    let mut lines = vec!["the cloud is empty; the status of the pixels:".to_owned()];
+    for status in PixelStatus::ALL.into_iter().filter(|status| totals.status_counts[status.name()] > 0) {
+        let (name, share) = (status.name(), share(totals, status));
+        lines.push(format!("  {} ({share:.1} %) {name}: {}", totals.status_counts[name], help(status)));
     }
     lines
 }
 
-/// Percentage of the pixels with this outcome.
-fn share(totals: &Totals, outcome: PixelStatus) -> f64 {
-    totals.outcomes[outcome.name()] as f64 * 100.0 / totals.pixels.max(1) as f64
+/// Percentage of the pixels with this status.
+fn share(totals: &Totals, status: PixelStatus) -> f64 {
+    totals.status_counts[status.name()] as f64 * 100.0 / totals.pixels.max(1) as f64
 }
 
 #[cfg(test)]
@@ -178,8 +193,8 @@ mod tests {
     #[test]
     fn an_empty_cloud_is_explained_by_the_reasons_that_occurred() {
         let counts = [0, 0, 300, 0, 700, 0];
-        let outcomes = PixelStatus::ALL.iter().map(|outcome| outcome.name()).zip(counts).collect();
-        let lines = reasons(&Totals { pixels: 1000, outcomes, ..Totals::default() });
+        let status_counts = PixelStatus::ALL.iter().map(|status| status.name()).zip(counts).collect();
+        let lines = reasons(&Totals { pixels: 1000, status_counts, ..Totals::default() });
         assert_eq!(lines.len(), 3, "{lines:?}");
         assert!(lines[1].starts_with("  300 (30.0 %) no_texture: "), "{}", lines[1]);
         assert!(lines[2].starts_with("  700 (70.0 %) inconsistent: "), "{}", lines[2]);

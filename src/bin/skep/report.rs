@@ -1,4 +1,4 @@
-//! `report.json`: what a run did, in numbers. Tools read the fields; a name once given stays.
+//! `report.json`: counts, times and options of a run. Tools read it: names stay, new ones may come.
 
 use crate::info;
 use crate::stopwatch::Times;
@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
 
-/// The whole report.
+/// The file.
 #[derive(Serialize)]
 pub struct Report {
     version: &'static str,
@@ -26,10 +26,12 @@ pub struct Report {
     views: Vec<ViewReport>,
 }
 
-/// The whole run.
+/// All views together.
 #[derive(Default, Serialize)]
 pub struct Totals {
     pub pixels: u64,
+    pub status_counts: BTreeMap<&'static str, u64>,
+    /// The same as `status_counts`, under the name that tools know.
     pub outcomes: BTreeMap<&'static str, u64>,
     pub ncc_evaluations: u64,
     pub bilinear_samples: u64,
@@ -50,6 +52,8 @@ struct ViewReport {
     depth_min: f64,
     depth_max: f64,
     sources: Vec<String>,
+    status_counts: BTreeMap<&'static str, u64>,
+    /// The same as `status_counts`, under the name that tools know.
     outcomes: BTreeMap<&'static str, u64>,
     ncc_evaluations: u64,
     bilinear_samples: u64,
@@ -68,7 +72,7 @@ pub struct CycleReport {
 }
 
 impl Report {
-    /// Collects it; the times are those until now and can be brought up to date with [`Report::set_times`].
+    /// Collects everything but the times, which [`Report::set_times`] sets.
     pub fn new(scene: &Scene, preset: &str, options: &Options, result: &Reconstruction) -> Report {
         let views =
             result.views.iter().enumerate().map(|(index, view)| view_report(scene, index, view)).collect();
@@ -85,7 +89,7 @@ impl Report {
         }
     }
 
-    /// Sets the time of each phase and of all together, and the memory that was needed.
+    /// Sets the time of each phase and of the whole run, and the peak memory.
     pub fn set_times(&mut self, times: Times) {
         let total = times.total();
         self.phases = times;
@@ -94,7 +98,7 @@ impl Report {
         self.totals.peak_resident_bytes = peak_resident_bytes();
     }
 
-    /// Writes it, whole or not at all.
+    /// Writes the file, whole or not at all.
     pub fn write(&self, path: &Path) -> Result<()> {
         skep::io::write_file(path, |out| {
             serde_json::to_writer_pretty(&mut *out, self)?;
@@ -103,7 +107,7 @@ impl Report {
     }
 }
 
-/// The value of an option as JSON has it.
+/// An option's value as JSON.
 fn typed(value: OptionValue) -> Value {
     match value {
         OptionValue::Count(value) => value.into(),
@@ -115,22 +119,23 @@ fn typed(value: OptionValue) -> Value {
 
 fn totals(scene: &Scene, result: &Reconstruction) -> Totals {
     let mut counts = Counts::default();
-    let mut outcomes = [0; PixelStatus::ALL.len()];
+    let mut status_counts = [0; PixelStatus::ALL.len()];
     let mut cycles: Vec<CycleRecord> = Vec::new();
     for view in &result.views {
         counts += view.counts;
-        for (total, count) in outcomes.iter_mut().zip(view.status_counts()) {
+        for (total, count) in status_counts.iter_mut().zip(view.status_counts()) {
             *total += count;
         }
         for cycle in &view.cycles {
             add_cycle(&mut cycles, cycle);
         }
     }
-    // Coarse to fine: the order in which a run goes through them.
+    // Coarse to fine, the order of the run.
     cycles.sort_by_key(|cycle| (std::cmp::Reverse(cycle.downscale), cycle.cycle));
     Totals {
         pixels: scene.views().iter().map(|view| view.camera.pixels() as u64).sum(),
-        outcomes: by_name(outcomes),
+        status_counts: by_name(status_counts),
+        outcomes: by_name(status_counts),
         ncc_evaluations: counts.ncc_evaluations,
         bilinear_samples: counts.bilinear_samples,
         early_terminations: counts.early_terminations,
@@ -166,6 +171,7 @@ fn view_report(scene: &Scene, index: usize, result: &ViewResult) -> ViewReport {
         depth_min: range.near,
         depth_max: range.far,
         sources: result.sources.iter().map(|&source| scene.views()[source as usize].name.clone()).collect(),
+        status_counts: by_name(result.status_counts()),
         outcomes: by_name(result.status_counts()),
         ncc_evaluations: result.counts.ncc_evaluations,
         bilinear_samples: result.counts.bilinear_samples,
@@ -175,7 +181,7 @@ fn view_report(scene: &Scene, index: usize, result: &ViewResult) -> ViewReport {
 }
 
 fn by_name(counts: [u64; PixelStatus::ALL.len()]) -> BTreeMap<&'static str, u64> {
-    PixelStatus::ALL.iter().map(|outcome| outcome.name()).zip(counts).collect()
+    PixelStatus::ALL.iter().map(|status| status.name()).zip(counts).collect()
 }
 
 impl From<&CycleRecord> for CycleReport {
@@ -185,7 +191,7 @@ impl From<&CycleRecord> for CycleReport {
     }
 }
 
-/// The most memory the process has held, where the system tells (Linux).
+/// Peak resident memory of the process, where the system tells (Linux).
 fn peak_resident_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

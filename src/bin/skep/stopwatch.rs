@@ -65,7 +65,7 @@ impl Times {
     }
 }
 
-/// Runs through the stages, in any order and as often as they come.
+/// Measures the stages, in any order and any number of times.
 pub struct Stopwatch {
     stage: Stage,
     started: Instant,
@@ -84,21 +84,22 @@ impl Stopwatch {
         }
     }
 
-    /// The stage that runs now begins; nothing happens when it is the one that was running.
+    /// Begins a stage; no effect when it is the current one.
     pub fn enter(&mut self, stage: Stage) {
         if stage != self.stage {
-            self.settle();
+            self.add_elapsed();
             self.stage = stage;
         }
     }
 
     /// The times up to now.
     pub fn times(&mut self) -> Times {
-        self.settle();
+        self.add_elapsed();
         self.times
     }
 
-    fn settle(&mut self) {
+    /// Adds the time since the last call to the current stage.
+    fn add_elapsed(&mut self) {
         let (now, cpu) = (Instant::now(), cpu_now());
         let spent = self.times.of(self.stage);
         spent.wall_seconds += (now - self.started).as_secs_f64();

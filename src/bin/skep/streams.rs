@@ -1,18 +1,19 @@
-//! Standard output and error. A reader that has gone away is no reason to stop, so what fails to be written is dropped.
+//! Standard output and error. A reader that closed the pipe is no reason to stop a run: failed writes are
+//! ignored.
 
 use std::io::Write;
 
-/// A line of what was asked for.
+/// Prints a line of the result on standard output.
 pub fn result(line: &str) {
     let _ = writeln!(std::io::stdout(), "{line}");
 }
 
-/// A line about the run: progress, warnings and errors.
+/// Prints a line about the run on standard error: progress, warnings, errors.
 pub fn notice(line: &str) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// A line about something the user should know; printed even when quiet is asked for.
+/// Prints a warning; also with `--quiet`.
 pub fn warning(text: &str) {
     notice(&format!("warning: {text}"));
 }

@@ -20,12 +20,21 @@ pub struct ModelImage {
 }
 
 /// A sparse model without distortion.
+///
+/// # Examples
+/// ```no_run
+/// let model = skep::io::ColmapModel::read("SCENE/sparse".as_ref())?;
+/// for image in &model.images {
+///     println!("{} was taken at {}", image.name, image.camera.center());
+/// }
+/// # Ok::<(), skep::Error>(())
+/// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ColmapModel {
     /// The images in the order of the file, which is what consistency graphs and `fused.ply.vis` count along.
     pub images: Vec<ModelImage>,
-    /// The points, with the indices of the images that saw them in ascending order. Their colors and errors and
-    /// the images' features are not kept.
+    /// The points, with the indices of the images that saw them in ascending order. Their colors and errors
+    /// and the images' features are not kept.
     pub points: Vec<SparsePoint>,
 }
 
@@ -35,13 +44,13 @@ impl ColmapModel {
         Files::find(folder).is_some()
     }
 
-    /// Reads `cameras`, `images` and, when it is there, `points3D` from a folder: the `.bin` files, else the `.txt`
-    /// files, as COLMAP chooses. Points that no file holds are no points.
+    /// Reads `cameras`, `images` and, when it is there, `points3D` from a folder: the `.bin` files, else the
+    /// `.txt` files, as COLMAP chooses. Without a file of points there are none.
     ///
     /// # Errors
-    /// No model there; a camera model with distortion; ids or names that occur twice; ids that do not exist; names
-    /// that lead out of their folder; sizes of 0 and numbers that are not finite; a zero quaternion; files that end
-    /// early or go on; a model without images.
+    /// No model there; a camera model with distortion; ids or names that occur twice; ids that do not exist;
+    /// names that lead out of their folder; sizes of 0 and numbers that are not finite; a zero quaternion;
+    /// files that end early or go on; a model without images.
     pub fn read(folder: &Path) -> Result<ColmapModel> {
         let Some(files) = Files::find(folder) else {
             let wanted =
@@ -52,16 +61,17 @@ impl ColmapModel {
         records.resolve(&files)
     }
 
-    /// Writes `cameras.txt`, `images.txt` and `points3D.txt`. Points get the projections of their positions as
-    /// features, gray as color and 0 as error.
+    /// Writes `cameras.txt`, `images.txt` and `points3D.txt`. Points get the projections of their positions
+    /// as features, gray as color and 0 as error.
     ///
     /// # Panics
-    /// A point names an image there is not.
+    /// A point names an image that does not exist.
     pub fn write_text(&self, folder: &Path) -> Result<()> {
         text::write(self, folder)
     }
 
-    /// Writes `cameras.bin`, `images.bin` and `points3D.bin` with the same content as [`ColmapModel::write_text`].
+    /// Writes `cameras.bin`, `images.bin` and `points3D.bin` with the same content as
+    /// [`ColmapModel::write_text`].
     pub fn write_binary(&self, folder: &Path) -> Result<()> {
         binary::write(self, folder)
     }

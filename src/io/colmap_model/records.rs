@@ -1,4 +1,4 @@
-//! What the files of a model say before ids are resolved, and what is checked alike for text and binary.
+//! The records of a model's files before ids are resolved, and the checks that text and binary share.
 
 use super::{ColmapModel, ModelImage};
 use crate::error::{Error, Result};
@@ -10,7 +10,7 @@ use std::collections::{HashMap, HashSet};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-/// COLMAP puts the center of the top-left pixel at (0.5, 0.5), the crate at (0, 0).
+/// Pixels: COLMAP has the center of the top-left pixel at (0.5, 0.5), the crate at (0, 0).
 const HALF_PIXEL: f64 = 0.5;
 
 /// COLMAP's camera models in the order of their numbers in binary files.
@@ -57,7 +57,7 @@ impl Files {
     }
 }
 
-/// Where a record stands.
+/// Where a record is, for error texts.
 pub(super) struct Place<'a> {
     pub path: &'a Path,
     /// Counted from 1; `None` in binary files.
@@ -136,7 +136,7 @@ pub(super) struct Records {
 }
 
 impl Records {
-    /// Turns ids into cameras and indices.
+    /// Replaces ids by cameras and indices.
     pub fn resolve(self, files: &Files) -> Result<ColmapModel> {
         let mut cameras = HashMap::new();
         for record in &self.cameras {
@@ -188,7 +188,7 @@ impl Records {
 }
 
 impl CameraRecord {
-    /// The camera, not projections yet.
+    /// The camera without its pose.
     fn camera(&self, place: &Place) -> Result<Camera> {
         let side = |side: u64| u32::try_from(side).unwrap_or(u32::MAX);
         let [fx, fy, cx, cy] = self.parameters;
@@ -234,9 +234,9 @@ impl ImageRecord {
     }
 }
 
-/// What is written, the same in text and binary. All ids count from 1.
+/// The content of the files, the same in text and binary. All ids count from 1.
 pub(super) struct Layout {
-    /// Distinct calibrations, unplaced.
+    /// Distinct calibrations: fx, fy, cx, cy.
     pub cameras: Vec<[f64; 4]>,
     /// Width and height of each.
     pub sizes: Vec<[u32; 2]>,
