@@ -192,7 +192,7 @@ mod scene;
 pub mod simd;
 #[cfg(test)]
 mod testing;
-pub mod view_selection;
+mod view_selection;
 
 pub use ambc::Counts;
 pub use error::{Error, Result};
@@ -202,9 +202,10 @@ pub use options::{
     CheckOptions, CostOptions, FusionOptions, Kind, OptionInfo, OptionValue, Options, RefineOptions, Scale,
     ScheduleOptions, SearchOptions, ViewSelectionOptions, WindowOptions,
 };
+pub use parallel::{Phase, Progress, ProgressFn, ignore_progress};
 pub use pipeline::{
-    AnyEstimate, Candidates, Checked, Cycle, CycleRecord, EstimateRef, OwnMaps, Phase, Progress, ProgressFn,
-    Reconstruction, Searched, Stepper, ViewEstimate, ViewResult, ignore_progress, reconstruct,
+    AnyEstimate, Candidates, Checked, Cycle, CycleRecord, EstimateRef, OwnMaps, Reconstruction, Searched,
+    Stepper, ViewEstimate, ViewResult, reconstruct,
 };
 pub use scene::{Maps, PixelStatus, Scene, SparsePoint, View};
 

@@ -1,6 +1,6 @@
 //! How C follows a run and stops it.
 
-use crate::pipeline::{Phase, Progress};
+use crate::parallel::{Phase, Progress};
 use std::ffi::c_void;
 use std::ops::ControlFlow;
 use std::sync::Mutex;

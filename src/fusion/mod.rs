@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::image::Picture;
 use crate::options::FusionOptions;
-use crate::pipeline::{Phase, Progress, ProgressFn};
+use crate::parallel::{Phase, Progress, ProgressFn};
 use crate::scene::{Maps, PixelStatus};
 use average::{Member, average};
 pub use cloud::{PointCloud, PointViews};

@@ -261,8 +261,8 @@ impl FusionOptions {
     /// An option out of its range.
     pub fn check(&self) -> Result<()> {
         let options = Options { fusion: *self, ..Options::default() };
-        let own = numbers().filter(|entry| entry.name().starts_with("fusion."));
-        own.map(|entry| entry.kind.check(entry.name(), (entry.get)(&options))).collect()
+        let mut own = numbers().filter(|entry| entry.name().starts_with("fusion."));
+        own.try_for_each(|entry| entry.kind.check(entry.name(), (entry.get)(&options)))
     }
 }
 

@@ -1,11 +1,13 @@
-//! Threads: the pool that ends with its owner, the one loop over bands of rows, and the callback that counts work and
-//! cancels it.
+//! Threads: the pool that ends with its owner, the one loop over bands of rows, and how work is counted, reported and
+//! cancelled.
 
 mod bands;
 mod pool;
+mod progress;
 
 pub use bands::{Bands, run_bands};
 pub use pool::JoinedPool;
+pub use progress::{Phase, Progress, ProgressFn, ignore_progress};
 
 use crate::error::Result;
 

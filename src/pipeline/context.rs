@@ -2,13 +2,12 @@
 
 use super::cycle::Cycle;
 use super::estimate::{Checked, ViewEstimate};
-use super::progress::{Phase, Progress};
 use super::store::PublishedSurfaces;
 use crate::cross_view::Donor;
 use crate::error::{Error, Result};
 use crate::matching::{Problem, Source, Window};
 use crate::options::Options;
-use crate::parallel::Advance;
+use crate::parallel::{Advance, Phase, Progress};
 use crate::refine::FilteredView;
 use crate::scene::{PixelEstimate, ScaledView, Scene};
 use crate::simd::SimdLevel;

@@ -17,13 +17,12 @@ mod store;
 
 use crate::error::Result;
 use crate::options::Options;
-use crate::parallel::JoinedPool;
+use crate::parallel::{JoinedPool, Phase, ProgressFn};
 use crate::scene::Scene;
 use context::{Place, RunContext};
 pub use cycle::Cycle;
 pub use estimate::{AnyEstimate, Checked, EstimateRef, OwnMaps, Searched, ViewEstimate};
 use progress::Tracker;
-pub use progress::{Phase, Progress, ProgressFn, ignore_progress};
 pub use result::{CycleRecord, Reconstruction, ViewResult};
 pub use stages::Candidates;
 use stages::SearchInput;
@@ -43,9 +42,9 @@ pub fn reconstruct(scene: &Scene, options: &Options, progress: ProgressFn) -> Re
 }
 
 /// The cycles of all scales, coarse to fine, then the end of the run.
-fn run(scene: &Scene, options: &Options, progress: ProgressFn) -> Result<Reconstruction> {
-    let mut tracker = Tracker::new(progress);
-    let context = RunContext::new(scene, options, &|_| tracker.advance(0, Progress::start(scene)))?;
+fn run(scene: &Scene, options: &Options, report: ProgressFn) -> Result<Reconstruction> {
+    let mut tracker = Tracker::new(report);
+    let context = RunContext::new(scene, options, &|_| tracker.advance(0, progress::start(scene)))?;
     tracker.set_work(context.work_before(context.cycles().len()));
     let mut estimates = Store::unknown(context.views());
     let mut next = Some(0);

@@ -1,64 +1,15 @@
-//! How a host follows a run and cancels it.
+//! Counts the work of a call and reports it to the host.
 
 use crate::error::{Error, Result};
+use crate::parallel::{Phase, Progress, ProgressFn};
 use crate::scene::Scene;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// What a run is doing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Phase {
-    /// The planes of a view are searched.
-    Search,
-    /// Views are checked against each other, and finished.
-    Check,
-    /// Maps are fused into points.
-    Fusion,
-}
-
-impl Phase {
-    /// One lower-case word.
-    pub fn name(self) -> &'static str {
-        match self {
-            Phase::Search => "search",
-            Phase::Check => "check",
-            Phase::Fusion => "fusion",
-        }
-    }
-}
-
-/// How far a run is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Progress {
-    /// What is done now.
-    pub phase: Phase,
-    /// Size of the images searched: 1 is full, 2 half, 4 a quarter.
-    pub downscale: u32,
-    /// The cycle on this scale, counted from 0.
-    pub cycle: u32,
-    /// The view that is worked on, counted from 0.
-    pub view: usize,
-    /// Number of views.
-    pub views: usize,
-    /// Fraction of the whole call that is done, 0 to 1. Cycles that are skipped because a scale ended early count as done.
-    pub done: f64,
-}
-
-/// The callback of a host, for progress and for cancelling: called often, from any worker thread, several calls may run at
-/// once; it must be quick. `Break` cancels the call, which then ends with [`crate::Error::Cancelled`] well within a second.
-pub type ProgressFn<'a> = &'a (dyn Fn(&Progress) -> ControlFlow<()> + Sync);
-
-/// The callback of a host that neither watches nor cancels.
-pub fn ignore_progress(_: &Progress) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
-
-impl Progress {
-    /// Before the first cycle.
-    pub(super) fn start(scene: &Scene) -> Progress {
-        let views = scene.views().len();
-        Progress { phase: Phase::Search, downscale: 1, cycle: 0, view: 0, views, done: 0.0 }
-    }
+/// The progress before the first cycle.
+pub fn start(scene: &Scene) -> Progress {
+    let views = scene.views().len();
+    Progress { phase: Phase::Search, downscale: 1, cycle: 0, view: 0, views, done: 0.0 }
 }
 
 /// Part of a whole run's work that fusion is estimated at.
@@ -67,8 +18,10 @@ const FUSION_SHARE: f64 = 0.03;
 /// Counts the work of a call and reports it to the host.
 pub struct Tracker<'a> {
     progress: ProgressFn<'a>,
-    /// Units of work of the whole call.
+    /// Units of work of the call before fusion.
     total: f64,
+    /// Their part of the whole call.
+    share: f64,
     done: AtomicU64,
     cancelled: AtomicBool,
 }
@@ -82,12 +35,12 @@ impl<'a> Tracker<'a> {
     /// A tracker of a call of so many units of work.
     pub fn with_work(progress: ProgressFn<'a>, units: u64) -> Tracker<'a> {
         let (done, cancelled) = (AtomicU64::new(0), AtomicBool::new(false));
-        Tracker { progress, total: units.max(1) as f64, done, cancelled }
+        Tracker { progress, total: units.max(1) as f64, share: 1.0, done, cancelled }
     }
 
     /// Sets the work of a whole run before fusion.
     pub fn set_work(&mut self, units: u64) {
-        self.total = units.max(1) as f64 / (1.0 - FUSION_SHARE);
+        (self.total, self.share) = (units.max(1) as f64, 1.0 - FUSION_SHARE);
     }
 
     /// Adds finished work and reports where the call is.
@@ -96,7 +49,7 @@ impl<'a> Tracker<'a> {
     /// [`Error::Cancelled`] once the host has cancelled.
     pub fn advance(&self, units: u64, at: Progress) -> Result<()> {
         let done = self.done.fetch_add(units, Ordering::Relaxed) + units;
-        self.report(&Progress { done: (done as f64 / self.total).min(1.0), ..at })
+        self.report(&Progress { done: self.share * (done as f64 / self.total).min(1.0), ..at })
     }
 
     /// Sets the finished work, when some was skipped.
@@ -120,6 +73,7 @@ impl<'a> Tracker<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::parallel::ignore_progress;
     use std::sync::Mutex;
 
     const SOMEWHERE: Progress =

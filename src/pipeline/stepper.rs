@@ -3,12 +3,13 @@
 use super::context::{Place, RunContext};
 use super::cycle::Cycle;
 use super::estimate::{Checked, EstimateRef, Searched, ViewEstimate};
-use super::progress::{Phase, ProgressFn, Tracker};
+use super::progress::Tracker;
 use super::result::ViewResult;
 use super::stages::{self, Candidates, SearchInput};
 use super::store::{PublishedSurfaces, SourcePlanes};
 use crate::error::{Error, Result};
 use crate::options::Options;
+use crate::parallel::{Phase, ProgressFn};
 use crate::scene::Scene;
 
 /// A run taken apart, for hosts that schedule views themselves, on this machine or on many, or bring maps of their own.
