@@ -17,7 +17,7 @@ static int32_t show(void *user, const skep_progress *at) {
     static const char *const PHASES[] = {"search", "check", "fusion"};
     (void)user;
     fprintf(stderr, "\r%3.0f %%  %s at 1/%u, cycle %u, view %u of %u    ", 100 * at->done,
-            PHASES[at->phase], (unsigned)at->reduction, (unsigned)at->cycle + 1,
+            PHASES[at->phase], (unsigned)at->downscale, (unsigned)at->cycle + 1,
             (unsigned)at->view + 1, (unsigned)at->view_count);
     return interrupted;
 }
@@ -44,7 +44,7 @@ static void print_view(const skep_scene *scene, const skep_result *result, uint3
     demand(skep_result_get_statistics(result, view, &statistics));
     printf("%s %ux%u:", name, (unsigned)width, (unsigned)height);
     for (reason = SKEP_PIXEL_VALIDATED; reason <= SKEP_PIXEL_OUT_OF_RANGE; ++reason) {
-        printf(" %.1f %% %s,", 100.0 * (double)statistics.pixels[reason] / width / height,
+        printf(" %.1f %% %s,", 100.0 * (double)statistics.status_counts[reason] / width / height,
                REASONS[reason]);
     }
     printf(" %.1f M patches compared\n", (double)statistics.ncc_evaluations / 1e6);

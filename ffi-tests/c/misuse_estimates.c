@@ -18,8 +18,8 @@ static void check_maps(const scene *made, const skep_stepper *stepper, uint32_t 
     memcpy(depth, truth->depth, pixels * sizeof *depth);
     memcpy(normal, truth->normal, pixels * 3 * sizeof *normal);
     skep_estimate **out = OUT(skep_estimate *, 0);
-#define FROM(stepper, step, view, depth, a, normal, b, validated, c, cost, d, out)                   \
-    skep_estimate_from_maps(stepper, step, view, depth, a, normal, b, validated, c, cost, d, out)
+#define FROM(stepper, cycle, view, depth, a, normal, b, validated, c, cost, d, out)                   \
+    skep_estimate_from_maps(stepper, cycle, view, depth, a, normal, b, validated, c, cost, d, out)
     const size_t w = made->width;
     FAILS(FROM(NULL, last, 0, depth, row, normal, 3 * row, NULL, 0, NULL, 0, out), SKEP_ERR_NULL,
           "stepper");
@@ -28,9 +28,9 @@ static void check_maps(const scene *made, const skep_stepper *stepper, uint32_t 
     FAILS(FROM(stepper, last, 0, depth, row, NULL, 3 * row, NULL, 0, NULL, 0, out), SKEP_ERR_NULL,
           "normal");
     FAILS(FROM(stepper, last, 0, depth, row, normal, 3 * row, NULL, 0, NULL, 0, NULL), SKEP_ERR_NULL,
-          "state_out");
+          "estimate_out");
     FAILS(FROM(stepper, last + 1, 0, depth, row, normal, 3 * row, NULL, 0, NULL, 0, out),
-          SKEP_ERR_ARGUMENT, "step");
+          SKEP_ERR_ARGUMENT, "cycle");
     FAILS(FROM(stepper, last, 9, depth, row, normal, 3 * row, NULL, 0, NULL, 0, out),
           SKEP_ERR_ARGUMENT, "view");
     FAILS(FROM(stepper, last, 0, depth, row - 1, normal, 3 * row, NULL, 0, NULL, 0, out),
@@ -97,8 +97,8 @@ static void check_getters(const skep_estimate *estimate, size_t pixels) {
 
 /* Every cut is refused, whether bytes are missing or too many; none is read past its end. */
 static void check_cuts(const skep_stepper *stepper, const uint8_t *bytes, size_t size) {
-    const size_t step = size / 200 + 1;
-    for (size_t cut = 0; cut < size; cut += cut < 300 ? 1 : step) {
+    const size_t stride = size / 200 + 1;
+    for (size_t cut = 0; cut < size; cut += cut < 300 ? 1 : stride) {
         guarded memory = guarded_take(cut);
         memcpy(memory.bytes, bytes, cut);
         FAILS(skep_estimate_load(stepper, memory.bytes, cut, OUT(skep_estimate *, 0)), SKEP_ERR_ARGUMENT,
@@ -114,7 +114,7 @@ static void check_cuts(const skep_stepper *stepper, const uint8_t *bytes, size_t
     free(longer);
     FAILS(skep_estimate_load(NULL, bytes, size, OUT(skep_estimate *, 0)), SKEP_ERR_NULL, "stepper");
     FAILS(skep_estimate_load(stepper, NULL, size, OUT(skep_estimate *, 0)), SKEP_ERR_NULL, "bytes");
-    FAILS(skep_estimate_load(stepper, bytes, size, NULL), SKEP_ERR_NULL, "state_out");
+    FAILS(skep_estimate_load(stepper, bytes, size, NULL), SKEP_ERR_NULL, "estimate_out");
     FAILS(skep_estimate_load(stepper, bytes, SIZE_MAX, OUT(skep_estimate *, 0)), SKEP_ERR_ARGUMENT,
           "bytes");
 }
@@ -124,7 +124,7 @@ static uint32_t next_random(uint32_t *estimate) {
     return *estimate >> 8;
 }
 
-/* A estimate that was garbled and yet passes may be wrong, but a step with it ends like any other. */
+/* An estimate that was garbled and yet passes may be wrong, but a cycle with it ends like any other. */
 static void use(const scene *made, const skep_stepper *stepper, skep_estimate *estimate) {
     const skep_estimate *estimates[MAX_VIEWS] = {NULL};
     skep_estimate_info info;

@@ -23,11 +23,11 @@ static void check_runs(const skep_scene *handed_in) {
     FAILS(skep_stepper_create(handed_in, options, OUT(skep_stepper *, 0)), SKEP_ERR_ARGUMENT,
           "triangulation_angle");
     REQUIRE(skep_options_set(options, "triangulation_angle.min", 4));
-    REQUIRE(skep_options_set(options, "focused_views", 1));
+    REQUIRE(skep_options_set(options, "max_views_per_pixel", 1));
     FAILS(skep_reconstruct(handed_in, options, NULL, NULL, OUT(skep_result *, 0)),
-          SKEP_ERR_ARGUMENT, "focused_views");
+          SKEP_ERR_ARGUMENT, "max_views_per_pixel");
     FAILS(skep_fuse(NULL, 0, options, NULL, NULL, OUT(skep_cloud *, 0)), SKEP_ERR_ARGUMENT,
-          "focused_views");
+          "max_views_per_pixel");
     skep_options_destroy(options);
 }
 
@@ -299,10 +299,9 @@ void test_misuse_run(const char *folder) {
     skep_options *options = quick_options();
     if (scene_is_small()) {
         /* Enough points to misuse take a cycle more at full size. */
-        const skep_scale scales[] = {
-            {.halvings = 1, .foods = 4, .first_iterations = 5, .cycles = 1, .cycle_iterations = 1},
-            {.halvings = 0, .foods = 3, .first_iterations = 1, .cycles = 2, .cycle_iterations = 1}};
-        REQUIRE(skep_options_set_scales(options, scales, 2));
+        REQUIRE(skep_options_set_text(options, "schedule.scales",
+                                      "downscale=2 food_sources=4 iterations=5+1x1; "
+                                      "downscale=1 food_sources=3 iterations=1+2x1"));
     }
     skep_scene *handed_in = scene_hand_in(&made);
     skep_result *result = scene_run(handed_in, options);

@@ -81,10 +81,10 @@ static void check_agreement(const skep_camera *camera, const view_maps *maps) {
         CHECK((maps->source_bits[i] & ~all) == 0, "%x of %zu sources",
               (unsigned)maps->source_bits[i], maps->source_total);
     }
-    CHECK(same_bytes(counts, maps->statistics.status_counts, sizeof counts), "outcomes are counted");
+    CHECK(same_bytes(counts, maps->statistics.status_counts, sizeof counts), "statuses are counted");
     CHECK(maps->statistics.ncc_evaluations > pixels, "%llu",
           (unsigned long long)maps->statistics.ncc_evaluations);
-    CHECK(maps->statistics.samples > maps->statistics.ncc_evaluations,
+    CHECK(maps->statistics.bilinear_samples > maps->statistics.ncc_evaluations,
           "patches have several samples");
     CHECK(maps->statistics.early_terminations > 0, "some hypotheses are given up early");
     CHECK(maps->cycle_total >= 2, "%zu", maps->cycle_total);
@@ -139,7 +139,7 @@ static void check_strides(const skep_result *result, uint32_t view, const view_m
     CHECK(same_bytes(depth, maps->depth[0], 4 * width * height), "borrowed depths");
     CHECK(same_bytes(normal, maps->normal[0], 12 * width * height), "borrowed normals");
     CHECK(same_bytes(cost, maps->cost, 4 * width * height), "borrowed costs");
-    CHECK(same_bytes(status, maps->status, width * height), "borrowed outcomes");
+    CHECK(same_bytes(status, maps->status, width * height), "borrowed statuses");
 }
 
 /*

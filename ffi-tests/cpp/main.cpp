@@ -15,7 +15,7 @@ int main(int argc, char **argv) {
     test_run(folder);
     test_progress();
     test_stepper_equal_whole();
-    test_states();
+    test_estimates();
     test_kernels();
     test_files(folder);
 }

@@ -25,9 +25,9 @@ static Differences compare(const cv::Mat &reference, const cv::Mat &source, int 
                            const std::vector<skep::Pixel> &pixels,
                            const std::vector<skep::Homography> &homographies) {
     const double alike = std::numeric_limits<double>::infinity();
-    const skep::Window window = skep::Window::create(radius, std::uint32_t(step), alike, alike);
+    const skep::NccWindow window = skep::NccWindow::create(radius, std::uint32_t(step), alike, alike);
     std::vector<float> ncc(pixels.size());
-    skep::patch_ncc(window, skep::Samples::create(reference), skep::Samples::create(source), pixels,
+    skep::patch_ncc(window, skep::PackedImage::create(reference), skep::PackedImage::create(source), pixels,
                     homographies, ncc);
 
     const int side = 2 * radius / step + 1;

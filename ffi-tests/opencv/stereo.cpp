@@ -138,7 +138,7 @@ static std::array<cv::Mat, 2> our_disparities(const cv::Mat &left, const cv::Mat
         scene.set_depth_range(number, {focal * baseline / most_disparity, focal * baseline / 4});
     }
     skep::Options options;
-    options.set("min_consistent", 1); // a pair has one source
+    options.set("min_consistent_views", 1); // a pair has one source
     options.set("fusion.min_views", 1);
     // Near disparity 10 the default tolerance of 1 % is a tenth of a pixel; that much two views are
     // not sure of.

@@ -67,10 +67,10 @@ static void correlate_with_opencv(const Batch &batch, int step, std::vector<floa
 
 static void compare(int hypotheses, int step) {
     const Batch batch = made_batch(hypotheses);
-    const skep::Samples reference = skep::Samples::create(batch.reference);
-    const skep::Samples source = skep::Samples::create(batch.source);
+    const skep::PackedImage reference = skep::PackedImage::create(batch.reference);
+    const skep::PackedImage source = skep::PackedImage::create(batch.source);
     const double alike = std::numeric_limits<double>::infinity();
-    const skep::Window window = skep::Window::create(radius, std::uint32_t(step), alike, alike);
+    const skep::NccWindow window = skep::NccWindow::create(radius, std::uint32_t(step), alike, alike);
     std::vector<float> ours(patches), theirs(patches);
     // The best of rounds that take turns: what else the machine does slows single rounds of either
     // side.
@@ -86,7 +86,7 @@ static void compare(int hypotheses, int step) {
     const int side = 2 * radius / step + 1;
     std::printf("%3d samples, %2d hypotheses a pixel: %5.2f million patches/s (%s), OpenCV %.3f, "
                 "ratio %.1f\n",
-                side * side, hypotheses, patches / our_best / 1e6, skep::backend_name(),
+                side * side, hypotheses, patches / our_best / 1e6, skep::simd_level_name(),
                 patches / their_best / 1e6, their_best / our_best);
     double difference = 0;
     for (std::size_t i = 0; i < patches; ++i)

@@ -113,10 +113,10 @@ def scene() -> skep.Scene:
     return made
 
 
-def options(**values: float) -> skep.Options:
+def options(**values: skep._options.Value) -> skep.Options:
     return skep.Options(**{"threads": 2, "fusion_min_views": 2, **values})
 
 
 def slow_options() -> skep.Options:
     """A run of many minutes, to be stopped."""
-    return skep.Options("paper", scales=[(0, 64, 10_000, 0, 0)], threads=2)
+    return skep.Options("paper", schedule_scales="downscale=1 food_sources=64 iterations=10000+0x0", threads=2)

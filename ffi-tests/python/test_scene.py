@@ -119,15 +119,28 @@ def test_cameras_are_checked():
 
 def test_options_are_items_and_attributes():
     options = skep.Options(max_sources=6, fusion_min_views=2, seed=5)
-    assert options["max_sources"] == options.max_sources == 6
-    assert options["fusion.min_views"] == options.fusion_min_views == 2
+    assert options["view_selection.max_sources"] == options.view_selection_max_sources == options["max_sources"] == 6
+    assert options["fusion.min_views"] == options.fusion_min_views == options.min_views == 2
     options["fusion.min_views"] = 4
-    options.propagation = False
-    assert options.fusion_min_views == 4 and options["propagation"] == 0 and options.seed == 5
-    assert len(options) == len(dict(options)) > 20 and "fusion.min_views" in options and "best_views" in dir(options)
-    assert skep.Options("paper").scales == (skep.Scale(0, 10, 20, 3, 2),) != options.scales
-    options.scales = [skep.Scale(1, 4, 2, 2, 1), (0, 3, 1, 1, 1)]
-    assert options.scales == ((1, 4, 2, 2, 1), (0, 3, 1, 1, 1)) and "seed=5" in repr(options)
+    options.view_propagation = False
+    options.check_depth_tolerance = 0.1 + 0.2
+    assert options.fusion_min_views == 4 and options["search.view_propagation"] is False
+    assert options["check.depth_tolerance"] == 0.1 + 0.2 and options.fusion_depth_tolerance == 0.01
+    assert options == skep.Options(**dict(options)) and len(options) == len(dict(options)) > 20
+    assert "fusion.min_views" in options and "best_views" in options and "best_views" in dir(options)
+    assert "seed" in repr(options)
+
+
+def test_values_of_options_have_types():
+    options = skep.Options("paper", seed=(1 << 64) - 1)
+    assert options.seed == (1 << 64) - 1 and type(options.threads) is int
+    assert type(options.window_sigma_spatial) is float and options.window_sigma_spatial == 5
+    assert options.refine_fill_gaps is False and options.simd == "best"
+    assert options.schedule_scales == options["scales"] == "downscale=1 food_sources=10 iterations=20+3x2"
+    options.scales = "downscale=2 food_sources=4 iterations=2+2x1; downscale=1 food_sources=3 iterations=1+1x1"
+    assert options.schedule_scales.startswith("downscale=2 food_sources=4 iterations=2+2x1; ")
+    options.min_consistent_views, options.fill_gaps = np.uint8(3), np.bool_(True)
+    assert options.check_min_consistent_views == 3 and options.refine_fill_gaps is True
 
 
 def test_options_refuse_what_is_none():
@@ -142,10 +155,12 @@ def test_options_refuse_what_is_none():
     for refused in (
         lambda: options.__setitem__("nonsense", 1),
         lambda: options.__setitem__("max_sources", 1.5),
-        lambda: setattr(options, "consistent_share", 2),
-        lambda: setattr(options, "scales", [(1, 4, 2, 2, 1)]),
+        lambda: setattr(options, "min_consistent_fraction", 2),
+        lambda: setattr(options, "scales", "downscale=2 food_sources=4 iterations=2+2x1"),
         lambda: setattr(options, "seed", -1),
-        lambda: options.set_simd("v9"),
+        lambda: setattr(options, "simd", "v9"),
+        lambda: options.__setitem__("depth_tolerance", 0.1),
+        lambda: options.__setitem__("fill_gaps", "yes"),
         lambda: skep.Options("best"),
         lambda: skep.Options(nonsense=1),
     ):

@@ -72,7 +72,7 @@ def test_an_array_outlives_the_result():
 
 
 def quick() -> skep.Options:
-    return skep.Options(threads=2, scales=[(1, 3, 2, 1, 1), (0, 3, 1, 1, 1)])
+    return skep.Options(threads=2, schedule_scales="downscale=2 food_sources=3 iterations=2+1x1; downscale=1 food_sources=3 iterations=1+1x1")
 
 
 def test_bits_do_not_depend_on_threads_instruction_set_or_array_layout():
@@ -81,9 +81,9 @@ def test_bits_do_not_depend_on_threads_instruction_set_or_array_layout():
         for photograph in made.photographs()[:3]:
             image, order = change(photograph.image)
             scene.add_view(image, photograph.camera, order=order, depth_range=made.DEPTH_RANGE)
-        options = skep.Options(scales=quick().scales, **values)
+        options = skep.Options(schedule_scales=quick().schedule_scales, **values)
         if values["threads"] == 1:
-            options.set_simd("scalar")
+            options.simd = "scalar"
         return [view.depth.tobytes() for view in skep.reconstruct(scene, options)]
 
     def wide(image):

@@ -16,19 +16,19 @@
 #define SKEP_NO_EXCEPTIONS
 #endif
 
-// Parts of a program that handle errors differently, or speak another C++, may be linked together.
+// Parts of a program that handle errors differently, or are compiled as another C++, may be linked together.
 #if defined(SKEP_NO_EXCEPTIONS) && __cplusplus >= 202002L
-#define SKEP_FLAVOUR expected_20
+#define SKEP_FLAVOR expected_20
 #elif defined(SKEP_NO_EXCEPTIONS)
-#define SKEP_FLAVOUR expected_17
+#define SKEP_FLAVOR expected_17
 #elif __cplusplus >= 202002L
-#define SKEP_FLAVOUR throwing_20
+#define SKEP_FLAVOR throwing_20
 #else
-#define SKEP_FLAVOUR throwing_17
+#define SKEP_FLAVOR throwing_17
 #endif
 
 namespace skep {
-inline namespace SKEP_FLAVOUR {
+inline namespace SKEP_FLAVOR {
 
 /// Why a call failed.
 class Error : public std::exception {
@@ -84,7 +84,7 @@ template <class T> using Fallible = T;
 #endif
 
 namespace detail {
-/// What a call came to, before it is told to the user.
+/// The status and the text of a call, before they become an exception or an Expected.
 struct Status {
     skep_status status = SKEP_OK;
     std::string text;
@@ -105,7 +105,7 @@ struct Status {
         return status;
     }
     explicit operator bool() const noexcept { return status == SKEP_OK; }
-    /// Goes on with `next` if nothing failed so far.
+    /// Calls `next` unless something failed before.
     template <class Next> Status then(Next next) && {
         return *this ? Status(next()) : std::move(*this);
     }
@@ -154,7 +154,7 @@ template <class Call> Status text(std::string &out, Call call) {
 }
 } // namespace detail
 
-} // namespace SKEP_FLAVOUR
+} // namespace SKEP_FLAVOR
 } // namespace skep
 
 #endif // SKEP_ERROR_HPP

@@ -14,7 +14,7 @@
 #endif
 
 namespace skep {
-inline namespace SKEP_FLAVOUR {
+inline namespace SKEP_FLAVOR {
 
 #if __cplusplus >= 202002L
 template <class T> using Span = std::span<T>;
@@ -129,9 +129,9 @@ inline std::string by(long long a, long long b) {
     return std::to_string(a) + " x " + std::to_string(b);
 }
 
-/// Looks at a map of any kind as `channels` numbers of type T a pixel.
+/// A view of a map of any kind, of `channels` numbers of type T a pixel.
 template <class T, class M>
-Status look(M &map, std::uint32_t channels, const char *name, MapView<T> &view) {
+Status view_of(M &map, std::uint32_t channels, const char *name, MapView<T> &view) {
     std::uint32_t found = 0;
     bool fits = true;
     if constexpr (IsMat<M>::value) {
@@ -159,7 +159,7 @@ Status look(M &map, std::uint32_t channels, const char *name, MapView<T> &view) 
         std::to_string(channels) + " channel(s) of " + std::to_string(sizeof(T)) + " bytes");
 }
 
-/// Gives a map of any kind this size, or finds that it has it, and looks at it.
+/// Resizes a map of any kind, or checks its size where it cannot be resized; gives a view of it.
 template <class T, class M>
 Status make(M &map, Size size, std::uint32_t channels, const char *name, MapView<T> &view) {
     if constexpr (IsMat<M>::value) {
@@ -169,7 +169,7 @@ Status make(M &map, Size size, std::uint32_t channels, const char *name, MapView
     } else if constexpr (!std::is_pointer_v<decltype(map.data)>) {
         map = Map<T>(size, channels);
     }
-    return look<T>(map, channels, name, view).then([&]() -> Status {
+    return view_of<T>(map, channels, name, view).then([&]() -> Status {
         if (view.width == size.width && view.height == size.height) return {};
         return Status::argument(name, by(view.width, view.height),
                                  by(size.width, size.height) + ", as the view");
@@ -226,7 +226,7 @@ template <class V> Status read_vector(const V &vector, const char *name, double 
 }
 
 template <class Image>
-Status look_at_image(const Image &image, bool is_rgb, const char *name, skep_image &out) {
+Status image_of(const Image &image, bool is_rgb, const char *name, skep_image &out) {
     if constexpr (std::is_same_v<Image, skep_image>) {
         out = image;
         return {};
@@ -254,19 +254,19 @@ Status look_at_image(const Image &image, bool is_rgb, const char *name, skep_ima
 
 enum class Order { Bgr, Rgb };
 
-/// Looks at a picture of the shape of cv::Mat; colors are in OpenCV's order unless told otherwise.
+/// A skep_image of a picture of the shape of cv::Mat, without a copy; colors are in OpenCV's order unless told otherwise.
 template <class Image> Fallible<skep_image> image(const Image &picture, Order order = Order::Bgr) {
     skep_image out = {};
-    detail::Status status = detail::look_at_image(picture, order == Order::Rgb, "picture", out);
+    detail::Status status = detail::image_of(picture, order == Order::Rgb, "picture", out);
     return detail::give(std::move(status), out);
 }
 
-/// Looks at any map as `channels` numbers of type T a pixel, such as look<float>(depth) or
-/// look<float>(normals, 3).
+/// A view of any map, of `channels` numbers of type T a pixel, without a copy: map_view<float>(depth) or
+/// map_view<float>(normals, 3).
 template <class T, class M>
-Fallible<MapView<const T>> look(const M &map, std::uint32_t channels = 1) {
+Fallible<MapView<const T>> map_view(const M &map, std::uint32_t channels = 1) {
     MapView<const T> view;
-    detail::Status status = detail::look<const T>(map, channels, "map", view);
+    detail::Status status = detail::view_of<const T>(map, channels, "map", view);
     return detail::give(std::move(status), view);
 }
 
@@ -288,7 +288,7 @@ Fallible<skep_camera> camera(const K &k, const R &rotation, const T &translation
     return detail::give(std::move(status), camera);
 }
 
-} // namespace SKEP_FLAVOUR
+} // namespace SKEP_FLAVOR
 } // namespace skep
 
 #endif // SKEP_SHAPES_HPP

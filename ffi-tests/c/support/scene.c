@@ -57,7 +57,7 @@ static double cell(int32_t x, int32_t y, uint32_t seed) {
     return (hash ^ (hash >> 15)) / 4294967296.0;
 }
 
-/* Those numbers with smooth stepper between them. */
+/* Those numbers, smoothly interpolated. */
 static double noise(double x, double y, uint32_t seed) {
     const double left = floor(x), top = floor(y);
     double u = x - left, v = y - top;
@@ -89,8 +89,8 @@ static vec3 ray(const skep_camera *camera, const pose *from, double x, double y)
     return add(sideways, from->down, (y - camera->cy) / camera->fy);
 }
 
-/* What a ray of length 1 in depth meets first: 1 the wall, 2 the board. */
-static int look(vec3 from, vec3 direction, double *depth, panel *met, double color[3]) {
+/* The surface that a ray of length 1 in depth meets first: 1 the wall, 2 the board. */
+static int cast(vec3 from, vec3 direction, double *depth, panel *met, double color[3]) {
     double u, v;
     int which = 2;
     *met = board();
@@ -114,7 +114,7 @@ static void photograph_pixel(const scene *made, photograph *taken, const pose *f
     const size_t pixel = (size_t)y * made->width + x;
     panel met;
     double depth, color[3], sum[3] = {0, 0, 0};
-    const int center = look(from->center, ray(&taken->camera, from, x, y), &depth, &met, color);
+    const int center = cast(from->center, ray(&taken->camera, from, x, y), &depth, &met, color);
     taken->depth[pixel] = (float)depth;
     taken->normal[3 * pixel] = (float)dot(met.normal, from->right);
     taken->normal[3 * pixel + 1] = (float)dot(met.normal, from->down);
@@ -125,7 +125,7 @@ static void photograph_pixel(const scene *made, photograph *taken, const pose *f
     for (int sample = 0; sample < SIDE * SIDE; ++sample) {
         const double dx = (sample % SIDE - SIDE / 2) / (double)SIDE;
         const double dy = (sample / SIDE - SIDE / 2) / (double)SIDE;
-        look(from->center, ray(&taken->camera, from, x + dx, y + dy), &depth, &met, color);
+        cast(from->center, ray(&taken->camera, from, x + dx, y + dy), &depth, &met, color);
         for (int channel = 0; channel < 3; ++channel) {
             sum[channel] += color[channel] / (SIDE * SIDE);
         }
@@ -134,7 +134,7 @@ static void photograph_pixel(const scene *made, photograph *taken, const pose *f
     const int reach = 4;
     for (int corner = 0; corner < 9; ++corner) {
         const double dx = (corner % 3 - 1) * reach, dy = (corner / 3 - 1) * reach;
-        if (look(from->center, ray(&taken->camera, from, x + dx, y + dy), &depth, &met, color) !=
+        if (cast(from->center, ray(&taken->camera, from, x + dx, y + dy), &depth, &met, color) !=
             center) {
             taken->surface[pixel] = 0;
         }
@@ -185,7 +185,7 @@ static vec3 columns_times(const skep_camera *camera, vec3 a) {
                   r[2] * a.x + r[5] * a.y + r[8] * a.z};
 }
 
-/* Whether a view shows this point of the world: there is nothing before it. */
+/* Whether a point of the world is visible in a view of the world: there is nothing before it. */
 static int sees(const scene *made, uint32_t view, vec3 point) {
     const skep_camera *camera = &made->photographs[view].camera;
     const double *t = camera->translation;
@@ -289,17 +289,16 @@ skep_scene *scene_hand_in(const scene *made) {
 }
 
 skep_options *quick_options(void) {
-    const skep_scale scales[] = {
-        {.halvings = 1, .foods = 4, .first_iterations = 5, .cycles = 1, .cycle_iterations = 1},
-        {.halvings = 0, .foods = 3, .first_iterations = 1, .cycles = 1, .cycle_iterations = 1}};
     skep_options *options = NULL;
     REQUIRE(skep_options_create(NULL, &options));
-    REQUIRE(skep_options_set_scales(options, scales, 2));
+    REQUIRE(skep_options_set_text(options, "schedule.scales",
+                                  "downscale=2 food_sources=4 iterations=5+1x1; "
+                                  "downscale=1 food_sources=3 iterations=1+1x1"));
     REQUIRE(skep_options_set(options, "threads", 2));
     REQUIRE(skep_options_set(options, "fusion.min_views", 2));
     if (scene_is_small()) {
         /* All of it is edge. */
-        REQUIRE(skep_options_set(options, "edge_passes", 0));
+        REQUIRE(skep_options_set(options, "fattening_passes", 0));
     }
     return options;
 }

@@ -2,27 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Literal, NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal
 
-from ._buffers import text
-from ._errors import ArgumentError, check
+import numpy as np
+
+from ._buffers import take_text, text
+from ._errors import check
 from ._native import ffi, lib
 
-
-class Scale(NamedTuple):
-    """The search on one scale of the image pyramid."""
-
-    halvings: int
-    """How often the images are halved: 0 is full size."""
-    foods: int
-    """Food sources of each pixel's colony, 2 to 64."""
-    first_iterations: int
-    """Iterations of the first cycle on this scale."""
-    cycles: int
-    """Cycles after the first."""
-    cycle_iterations: int
-    """Iterations of each of those."""
+Value = int | float | bool | str
+"""The value of an option."""
 
 
 def _names() -> Iterator[str]:
@@ -33,47 +23,59 @@ def _names() -> Iterator[str]:
 
 
 _NAMES = tuple(_names())
-_ATTRIBUTES = {name.replace(".", "_"): name for name in _NAMES}
 
 
-class Options(Mapping[str, float]):
-    """Options by name, as items or attributes: `options["fusion.min_views"]` is `options.fusion_min_views`.
+def _by_any_name() -> dict[str, str]:
+    """The full name of an option by each name that stands for it."""
+    fields = [name.rpartition(".")[2] for name in _NAMES]
+    full = {field: name for field, name in zip(fields, _NAMES) if fields.count(field) == 1}
+    full |= {name.replace(".", "_"): name for name in _NAMES}
+    return full | {name: name for name in _NAMES}
 
-    Starts from a preset: "default", which measures best, "fast", which takes less than half of its time, or "paper",
-    which follows the paper to the letter. `Options(threads=2, fusion_min_views=2)` sets some at once. Numbers are checked when they are set.
+
+_BY_ANY_NAME = _by_any_name()
+
+
+class Options(Mapping[str, Value]):
+    """Options by name, as items or attributes: `options["check.depth_tolerance"]` is `options.check_depth_tolerance`.
+
+    Where no other group has an option of that name, the group may be left out: `options["threads"]`,
+    `options.window_radius`. Values are checked when they are set.
+
+    Starts from a preset: "default" is the most accurate, "fast" takes less than half of its time, "paper" follows the
+    paper literally. `Options("fast", threads=2, fusion_min_views=2)` sets some at once.
     """
 
     __slots__ = ("_handle",)
 
     _handle: Any
 
-    def __init__(
-        self,
-        preset: Literal["default", "fast", "paper"] = "default",
-        *,
-        seed: int = 0,
-        scales: Iterable[Scale | tuple[int, int, int, int, int]] | None = None,
-        **values: float,
-    ) -> None:
+    # BEGIN OPTIONS
+    # END OPTIONS
+
+    def __init__(self, preset: Literal["default", "fast", "paper"] = "default", **values: Value) -> None:
         out = ffi.new("skep_options **")
         check(lib.skep_options_create(text(preset, "preset"), out))
         object.__setattr__(self, "_handle", ffi.gc(out[0], lib.skep_options_destroy))
-        self.seed = seed
-        if scales is not None:
-            self.scales = tuple(Scale(*scale) for scale in scales)
         for name, value in values.items():
-            self[_ATTRIBUTES.get(name, name)] = value
+            self[name] = value
 
-    def __getitem__(self, name: str) -> float:
-        if name not in _NAMES:
+    def __getitem__(self, name: str) -> Value:
+        if name not in _BY_ANY_NAME:
             raise KeyError(name)
-        value = ffi.new("double *")
-        check(lib.skep_options_get(self._handle, name.encode(), value))
-        number: float = value[0]
-        return number
+        full = _BY_ANY_NAME[name]
+        value = take_text(lambda *out: lib.skep_options_get_text(self._handle, full.encode(), *out))
+        return _TYPES[full](value)
 
-    def __setitem__(self, name: str, value: float) -> None:
-        check(lib.skep_options_set(self._handle, text(name, "name"), value))
+    def __setitem__(self, name: str, value: Value) -> None:
+        full = text(_BY_ANY_NAME.get(name, name), "name")
+        if isinstance(value, bool | np.bool_):
+            value = str(value).lower()
+        # A text holds every whole number, and the shortest text of a float is read back to the bit.
+        check(lib.skep_options_set_text(self._handle, full, text(str(value), name)))
+
+    def __contains__(self, name: object) -> bool:
+        return name in _BY_ANY_NAME
 
     def __iter__(self) -> Iterator[str]:
         return iter(_NAMES)
@@ -81,58 +83,33 @@ class Options(Mapping[str, float]):
     def __len__(self) -> int:
         return len(_NAMES)
 
-    def __getattr__(self, attribute: str) -> float:
-        if attribute not in _ATTRIBUTES:
+    def __getattr__(self, attribute: str) -> Value:
+        if attribute not in _BY_ANY_NAME:
             raise AttributeError(f"there is no option {attribute!r}")
-        return self[_ATTRIBUTES[attribute]]
+        return self[attribute]
 
-    def __setattr__(self, attribute: str, value: Any) -> None:
-        if attribute in _ATTRIBUTES:
-            self[_ATTRIBUTES[attribute]] = value
-        elif hasattr(type(self), attribute):
-            object.__setattr__(self, attribute, value)
-        else:
+    def __setattr__(self, attribute: str, value: Value) -> None:
+        if attribute not in _BY_ANY_NAME:
             raise AttributeError(f"there is no option {attribute!r}")
+        self[attribute] = value
 
     def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *_ATTRIBUTES]
+        return [*super().__dir__(), *(name for name in _BY_ANY_NAME if name.isidentifier())]
 
     def __repr__(self) -> str:
-        return f"Options({dict(self)}, seed={self.seed}, scales={list(self.scales)})"
+        return f"Options({dict(self)})"
 
-    @property
-    def seed(self) -> int:
-        """Of the random generator. The same seed, input and library version give the same bits."""
-        seed = ffi.new("uint64_t *")
-        check(lib.skep_options_get_seed(self._handle, seed))
-        return int(seed[0])
 
-    @seed.setter
-    def seed(self, seed: int) -> None:
-        if not 0 <= seed < 1 << 64:
-            raise ArgumentError(f"seed is {seed}: must be a whole number from 0 to 2^64 - 1")
-        check(lib.skep_options_set_seed(self._handle, seed))
+def _switch(value: str) -> bool:
+    return value == "true"
 
-    @property
-    def scales(self) -> tuple[Scale, ...]:
-        """From coarse to fine: halvings descend one by one to 0."""
-        count = ffi.new("size_t *")
-        check(lib.skep_options_get_scales(self._handle, ffi.NULL, 0, count))
-        found = ffi.new("skep_scale[]", count[0])
-        check(lib.skep_options_get_scales(self._handle, found, count[0], count))
-        return tuple(Scale(*(getattr(scale, field) for field in Scale._fields)) for scale in found)
 
-    @scales.setter
-    def scales(self, scales: Iterable[Scale | tuple[int, int, int, int, int]]) -> None:
-        wanted = [Scale(*scale) for scale in scales]
-        given = ffi.new("skep_scale[]", [scale._asdict() for scale in wanted])
-        check(lib.skep_options_set_scales(self._handle, given, len(wanted)))
-
-    def set_simd(self, level: Literal["scalar", "base", "v3"] | None) -> None:
-        """The instruction set; None is the best the machine has. Results do not depend on it."""
-        check(lib.skep_options_set_simd(self._handle, ffi.NULL if level is None else text(level, "level")))
+_TYPES = {
+    name: {"int": int, "float": float, "bool": _switch, "str": str}[Options.__annotations__[name.replace(".", "_")]]
+    for name in _NAMES
+}
 
 
 def handle(options: Options | None) -> Any:
-    """For the library; None are the defaults."""
+    """The options as the library takes them; None is the default preset."""
     return ffi.NULL if options is None else options._handle
