@@ -16,9 +16,9 @@
 //
 // What skep.h says of each function holds here; this file only says what is different.
 //
-// Objects (Options, Scene, Result, Cloud, Stepper, Estimate, Candidates, PackedImage, NccWindow) own what they
-// stand for, can be moved and not copied, and get() is the C object, for calls that are not
-// wrapped. Using an object that was moved from is an error, not a crash.
+// Objects (Options, Scene, Result, Cloud, Stepper, Estimate, Candidates, PackedImage, NccWindow)
+// own what they stand for, can be moved and not copied, and get() is the C object, for calls that
+// are not wrapped. Using an object that was moved from is an error, not a crash.
 //
 // Errors are exceptions of type skep::Error. With SKEP_NO_EXCEPTIONS defined, or exceptions turned
 // off in the compiler, every function whose type below is Fallible<T> returns a skep::Expected<T>

@@ -111,7 +111,8 @@ static void check_range(const scene *made, skep_scene *handed_in, const skep_opt
     for (size_t i = 0; i < scene_pixels(made); ++i) {
         CHECK(maps.depth[0][i] >= 2 && maps.depth[0][i] <= 2.5f, "%g", maps.depth[0][i]);
     }
-    CHECK(maps.statistics.status_counts[SKEP_PIXEL_VALIDATED] * 10 < scene_pixels(made), "%llu validated",
+    CHECK(maps.statistics.status_counts[SKEP_PIXEL_VALIDATED] * 10 < scene_pixels(made),
+          "%llu validated",
           (unsigned long long)maps.statistics.status_counts[SKEP_PIXEL_VALIDATED]);
     maps_free(&maps);
     skep_result_destroy(result);
@@ -219,7 +220,8 @@ static void check_extremes(const skep_options *options) {
         REQUIRE(skep_scene_validate(tiny));
         skep_result *result = scene_run(tiny, options);
         view_maps maps = maps_of(result, 0);
-        CHECK(maps.statistics.status_counts[SKEP_PIXEL_VALIDATED] == 0, "%u pixels", (unsigned)width);
+        CHECK(maps.statistics.status_counts[SKEP_PIXEL_VALIDATED] == 0, "%u pixels",
+              (unsigned)width);
         CHECK(maps.status[0] == SKEP_PIXEL_NO_SOURCES, "%u", maps.status[0]);
         maps_free(&maps);
         char warning[256] = "";

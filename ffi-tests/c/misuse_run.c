@@ -51,7 +51,7 @@ static skep_status get_cost(const skep_result *result, uint32_t view, void *out,
 }
 
 static skep_status get_status(const skep_result *result, uint32_t view, void *out,
-                               size_t stride_bytes) {
+                              size_t stride_bytes) {
     return skep_result_get_status(result, view, out, stride_bytes);
 }
 
@@ -69,7 +69,7 @@ static void check_maps(const scene *made, const skep_result *result) {
     static const struct {
         get_map *get;
         size_t size;
-    } MAPS[] = {{get_depth, 4},   {get_normal, 12}, {get_cost, 4},
+    } MAPS[] = {{get_depth, 4},  {get_normal, 12}, {get_cost, 4},
                 {get_status, 1}, {get_count, 2},   {get_bits, 4}};
     void *out = OUT(char, 0);
     for (size_t i = 0; i < sizeof MAPS / sizeof MAPS[0]; ++i) {
@@ -94,7 +94,8 @@ static void check_maps(const scene *made, const skep_result *result) {
 }
 
 static void check_results(const skep_result *result) {
-    FAILS(skep_result_get_views(NULL, OUT(uint32_t, 0), 9, OUT(size_t, 1)), SKEP_ERR_NULL, "result");
+    FAILS(skep_result_get_views(NULL, OUT(uint32_t, 0), 9, OUT(size_t, 1)), SKEP_ERR_NULL,
+          "result");
     FAILS(skep_result_get_views(result, NULL, 0, NULL), SKEP_ERR_NULL, "count_out");
     FAILS(skep_result_get_views(result, OUT(uint32_t, 0), 1, OUT(size_t, 1)), SKEP_ERR_CAPACITY,
           "views");
@@ -122,8 +123,8 @@ static void check_results(const skep_result *result) {
     FAILS(skep_result_get_statistics(result, 0, NULL), SKEP_ERR_NULL, "statistics_out");
     FAILS(skep_result_get_statistics(result, 9, OUT(skep_statistics, 0)), SKEP_ERR_ARGUMENT,
           "view is 9");
-    FAILS(skep_result_get_cycles(NULL, 0, OUT(skep_cycle_record, 0), 9, OUT(size_t, 2)), SKEP_ERR_NULL,
-          "result");
+    FAILS(skep_result_get_cycles(NULL, 0, OUT(skep_cycle_record, 0), 9, OUT(size_t, 2)),
+          SKEP_ERR_NULL, "result");
     FAILS(skep_result_get_cycles(result, 9, OUT(skep_cycle_record, 0), 9, OUT(size_t, 2)),
           SKEP_ERR_ARGUMENT, "view is 9");
     FAILS(skep_result_get_cycles(result, 0, OUT(skep_cycle_record, 0), 1, OUT(size_t, 2)),

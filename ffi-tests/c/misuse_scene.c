@@ -105,11 +105,21 @@ static void check_options(void) {
     static const struct {
         const char *name;
         double value;
-    } WRONG[] = {{"smoothness_reward", -0.1},         {"smoothness_reward", 1.1},       {"smoothness_reward", NAN},
-                 {"threads", 1.5},         {"threads", -1},       {"threads", 1e9},
-                 {"window_radius", 0},     {"window_radius", 17}, {"window_radius", 1e300},
-                 {"view_propagation", 2},       {"view_propagation", NAN},  {"min_consistent_views", 0},
-                 {"min_changed_fraction", INFINITY}, {"best_views", 9},     {"sigma_color", 0}};
+    } WRONG[] = {{"smoothness_reward", -0.1},
+                 {"smoothness_reward", 1.1},
+                 {"smoothness_reward", NAN},
+                 {"threads", 1.5},
+                 {"threads", -1},
+                 {"threads", 1e9},
+                 {"window_radius", 0},
+                 {"window_radius", 17},
+                 {"window_radius", 1e300},
+                 {"view_propagation", 2},
+                 {"view_propagation", NAN},
+                 {"min_consistent_views", 0},
+                 {"min_changed_fraction", INFINITY},
+                 {"best_views", 9},
+                 {"sigma_color", 0}};
     for (size_t i = 0; i < sizeof WRONG / sizeof WRONG[0]; ++i) {
         double before = -1, after = -2;
         REQUIRE(skep_options_get(options, WRONG[i].name, &before));

@@ -12,11 +12,11 @@
 #include <stdlib.h>
 
 static skep_estimate *true_estimate(const scene *made, const skep_stepper *stepper, uint32_t cycle,
-                              uint32_t view) {
+                                    uint32_t view) {
     const photograph *truth = &made->photographs[view];
     skep_estimate *estimate = NULL;
-    REQUIRE(skep_estimate_from_maps(stepper, cycle, view, truth->depth, 4 * made->width, truth->normal,
-                                 12 * made->width, NULL, 0, NULL, 0, &estimate));
+    REQUIRE(skep_estimate_from_maps(stepper, cycle, view, truth->depth, 4 * made->width,
+                                    truth->normal, 12 * made->width, NULL, 0, NULL, 0, &estimate));
     return estimate;
 }
 
@@ -36,7 +36,7 @@ static void check_round_trip(const scene *made, const skep_stepper *stepper, uin
     }
     skep_estimate *estimate = NULL;
     REQUIRE(skep_estimate_from_maps(stepper, cycle, 2, depth, 4 * stride, truth->normal, 12 * width,
-                                 validated, width, cost, 4 * width, &estimate));
+                                    validated, width, cost, 4 * width, &estimate));
     skep_estimate_info info;
     REQUIRE(skep_estimate_get_info(estimate, &info));
     CHECK(info.view == 2 && info.cycle == cycle && info.is_checked == 1 && info.reserved == 0,
@@ -48,7 +48,8 @@ static void check_round_trip(const scene *made, const skep_stepper *stepper, uin
           *normal_back = take(pixels, 3 * sizeof(float));
     float *cost_back = take(pixels, sizeof *cost_back);
     uint8_t *validated_back = take(pixels, 1);
-    REQUIRE(skep_estimate_get_maps(estimate, depth_back, normal_back, cost_back, validated_back, pixels));
+    REQUIRE(skep_estimate_get_maps(estimate, depth_back, normal_back, cost_back, validated_back,
+                                   pixels));
     REQUIRE(skep_estimate_get_maps(estimate, NULL, NULL, NULL, NULL, 0));
     for (size_t i = 0; i < pixels; ++i) {
         const int is_there = i % 5 != 0;
@@ -88,15 +89,16 @@ static void check_guidance(const scene *made, const skep_stepper *stepper, uint3
     skep_estimate *true_own = estimates[0];
     estimates[0] = NULL;
     REQUIRE(skep_estimate_from_maps(stepper, cycle, 0, nothing, 4 * made->width, truth->normal,
-                                 12 * made->width, NULL, 0, NULL, 0, &estimates[0]));
+                                    12 * made->width, NULL, 0, NULL, 0, &estimates[0]));
     size_t found[2];
     for (int is_offered = 0; is_offered < 2; ++is_offered) {
         skep_candidates *candidates = NULL;
         skep_estimate *searched = NULL;
-        REQUIRE(skep_stepper_propagate(stepper, cycle, 0, (const skep_estimate *const *)estimates, made->views,
-                                     &candidates));
-        REQUIRE(skep_stepper_search(stepper, cycle, 0, (const skep_estimate *const *)estimates, made->views,
-                                  is_offered ? candidates : NULL, NULL, NULL, &searched));
+        REQUIRE(skep_stepper_propagate(stepper, cycle, 0, (const skep_estimate *const *)estimates,
+                                       made->views, &candidates));
+        REQUIRE(skep_stepper_search(stepper, cycle, 0, (const skep_estimate *const *)estimates,
+                                    made->views, is_offered ? candidates : NULL, NULL, NULL,
+                                    &searched));
         REQUIRE(skep_estimate_get_maps(searched, depth, NULL, NULL, NULL, pixels));
         found[is_offered] = right(truth, depth, pixels);
         skep_estimate_info info;
@@ -120,11 +122,12 @@ static void check_guidance(const scene *made, const skep_stepper *stepper, uint3
 }
 
 /* Finished as they are, true maps match well and are all validated. */
-static void check_finished(const scene *made, const skep_stepper *stepper, skep_estimate **estimates) {
+static void check_finished(const scene *made, const skep_stepper *stepper,
+                           skep_estimate **estimates) {
     const size_t pixels = scene_pixels(made);
     skep_result *result = NULL;
-    REQUIRE(skep_stepper_finish(stepper, 1, (const skep_estimate *const *)estimates, made->views, NULL, NULL,
-                              &result));
+    REQUIRE(skep_stepper_finish(stepper, 1, (const skep_estimate *const *)estimates, made->views,
+                                NULL, NULL, &result));
     view_maps maps = maps_of(result, 1);
     CHECK(same_bytes(maps.depth[0], made->photographs[1].depth, 4 * pixels), "the maps given");
     CHECK(maps.statistics.status_counts[SKEP_PIXEL_VALIDATED] == pixels, "all are validated");
@@ -150,8 +153,8 @@ static void check_averaged(const scene *made, const skep_scene *handed_in, skep_
         estimates[view] = true_estimate(made, stepper, count - 1, view);
     }
     skep_result *result = NULL;
-    REQUIRE(skep_stepper_finish(stepper, 1, (const skep_estimate *const *)estimates, made->views, NULL, NULL,
-                              &result));
+    REQUIRE(skep_stepper_finish(stepper, 1, (const skep_estimate *const *)estimates, made->views,
+                                NULL, NULL, &result));
     view_maps maps = maps_of(result, 1);
     const photograph *truth = &made->photographs[1];
     size_t moved = 0;

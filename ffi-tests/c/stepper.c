@@ -67,9 +67,10 @@ static void run_cycle(by_hand *run, uint32_t cycle) {
     for (uint32_t n = 0; n < run->views; ++n) {
         const uint32_t view = nth(run, n);
         skep_candidates *candidates = NULL;
-        REQUIRE(skep_stepper_propagate(run->stepper, cycle, view, estimates, run->views, &candidates));
-        REQUIRE(skep_stepper_search(run->stepper, cycle, view, estimates, run->views, candidates, NULL, NULL,
-                                  &searched[view]));
+        REQUIRE(
+            skep_stepper_propagate(run->stepper, cycle, view, estimates, run->views, &candidates));
+        REQUIRE(skep_stepper_search(run->stepper, cycle, view, estimates, run->views, candidates,
+                                    NULL, NULL, &searched[view]));
         skep_candidates_destroy(candidates);
         if (run->is_saved) {
             save_and_load(run->stepper, &searched[view]);
@@ -78,8 +79,8 @@ static void run_cycle(by_hand *run, uint32_t cycle) {
     for (uint32_t n = 0; n < run->views; ++n) {
         const uint32_t view = nth(run, n);
         skep_estimate *checked = NULL;
-        REQUIRE(skep_stepper_check(run->stepper, cycle, view, (const skep_estimate *const *)searched,
-                                 run->views, &checked));
+        REQUIRE(skep_stepper_check(run->stepper, cycle, view,
+                                   (const skep_estimate *const *)searched, run->views, &checked));
         if (run->is_saved) {
             save_and_load(run->stepper, &checked);
         }
@@ -120,19 +121,21 @@ static void check_by_hand(const scene *made, const skep_scene *handed_in,
                           const skep_options *options, const skep_stepper *stepper,
                           const skep_result *whole, int variant) {
     static const char *const NAMES[] = {"in order", "in reverse", "saved", "in reverse and saved"};
-    by_hand run = {
-        .stepper = stepper, .views = made->views, .is_reversed = variant & 1, .is_saved = variant >> 1};
+    by_hand run = {.stepper = stepper,
+                   .views = made->views,
+                   .is_reversed = variant & 1,
+                   .is_saved = variant >> 1};
     for (uint32_t cycle = 0; cycle != SKEP_CYCLE_NONE;) {
         run_cycle(&run, cycle);
-        REQUIRE(
-            skep_stepper_next(stepper, cycle, (const skep_estimate *const *)run.estimates, run.views, &cycle));
+        REQUIRE(skep_stepper_next(stepper, cycle, (const skep_estimate *const *)run.estimates,
+                                  run.views, &cycle));
     }
     view_maps maps[MAX_VIEWS];
     for (uint32_t n = 0; n < run.views; ++n) {
         const uint32_t view = nth(&run, n);
         skep_result *finished = NULL;
-        REQUIRE(skep_stepper_finish(stepper, view, (const skep_estimate *const *)run.estimates, run.views,
-                                  NULL, NULL, &finished));
+        REQUIRE(skep_stepper_finish(stepper, view, (const skep_estimate *const *)run.estimates,
+                                    run.views, NULL, NULL, &finished));
         maps[view] = maps_of(finished, view);
         view_maps expected = maps_of(whole, view);
         check_same_maps(&maps[view], &expected, NAMES[variant]);
@@ -156,7 +159,7 @@ static void check_by_hand(const scene *made, const skep_scene *handed_in,
 }
 
 static void check_stepper_themselves(const scene *made, const skep_scene *handed_in,
-                                   const skep_options *options, const skep_stepper *stepper) {
+                                     const skep_options *options, const skep_stepper *stepper) {
     uint32_t count = 0, views = 0;
     REQUIRE(skep_stepper_get_count(stepper, &count, &views));
     CHECK(count == 4 && views == made->views, "%u stepper of %u views", (unsigned)count,
@@ -166,8 +169,8 @@ static void check_stepper_themselves(const scene *made, const skep_scene *handed
         skep_cycle found;
         uint32_t width = 0, height = 0;
         REQUIRE(skep_stepper_get_cycle(stepper, cycle, &found));
-        CHECK(found.downscale == (cycle < 2 ? 2 : 1) && found.cycle_on_scale == cycle % 2, "cycle %u",
-              (unsigned)cycle);
+        CHECK(found.downscale == (cycle < 2 ? 2 : 1) && found.cycle_on_scale == cycle % 2,
+              "cycle %u", (unsigned)cycle);
         CHECK(found.food_sources == (cycle < 2 ? 4 : 3), "cycle %u", (unsigned)cycle);
         CHECK(found.iterations == (cycle == 0 ? 5 : 1), "cycle %u", (unsigned)cycle);
         REQUIRE(skep_stepper_get_size(stepper, cycle, 1, &width, &height));

@@ -37,7 +37,8 @@ void test_kernels() {
     };
     const auto reference_picture = world::picture(reference, world::width, world::height);
     const auto source_picture = world::picture(source, world::width, world::height);
-    const skep::PackedImage reference_samples = MUST(skep::PackedImage::create(look(reference_picture)));
+    const skep::PackedImage reference_samples =
+        MUST(skep::PackedImage::create(look(reference_picture)));
     const skep::PackedImage source_samples = MUST(skep::PackedImage::create(look(source_picture)));
     const double all_alike = std::numeric_limits<double>::infinity();
     const skep::NccWindow window = MUST(skep::NccWindow::create(5, 1, all_alike, all_alike));

@@ -5,7 +5,8 @@
 #include <cstdio>
 
 int main(int argc, char **argv) {
-    if (argc != 2) return std::fputs("usage: program FOLDER\n", stderr), 2;
+    if (argc != 2)
+        return std::fputs("usage: program FOLDER\n", stderr), 2;
     const std::string folder = argv[1];
     test_library();
     test_spans();

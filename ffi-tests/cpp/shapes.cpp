@@ -162,7 +162,8 @@ static void test_maps(const std::string &folder) {
         MUST(skep::fuse(skep::Span<const skep::FusionView>(&view, 1), options));
     CHECK(MUST(cloud.size()) == std::size_t(cv::countNonZero(depth)));
     const skep::Stepper stepper = MUST(skep::Stepper::create(scene, options));
-    const skep::Estimate estimate = MUST(stepper.estimate_from_maps(0, 0, depth, normal, mask, cost));
+    const skep::Estimate estimate =
+        MUST(stepper.estimate_from_maps(0, 0, depth, normal, mask, cost));
     CHECK(MUST(estimate.maps()).depth == own_depth.data);
     FAILS(SKEP_ERR_ARGUMENT, "depth", stepper.estimate_from_maps(0, 0, status, normal));
 }

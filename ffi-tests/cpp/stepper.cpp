@@ -86,7 +86,7 @@ void test_estimates() {
     FAILS(SKEP_ERR_NULL, "estimate", none[0].info());
     FAILS(SKEP_ERR_CANCELLED, "",
           stepper.search(0, 2, none, skep::Candidates(),
-                       [](const skep::Progress &) { return skep::Flow::Cancel; }));
+                         [](const skep::Progress &) { return skep::Flow::Cancel; }));
 
     // As bytes and back: the same maps.
     const std::vector<std::uint8_t> bytes = MUST(found.save());

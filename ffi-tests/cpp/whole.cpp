@@ -164,7 +164,8 @@ void test_run(const std::string &folder) {
     std::uint64_t validated = 0;
     for (std::uint8_t value : status.data)
         validated += value == SKEP_PIXEL_VALIDATED;
-    CHECK(statistics.status_counts[SKEP_PIXEL_VALIDATED] == validated && statistics.ncc_evaluations > 0);
+    CHECK(statistics.status_counts[SKEP_PIXEL_VALIDATED] == validated &&
+          statistics.ncc_evaluations > 0);
     CHECK(MUST(result.cycles(0)).size() == 6 && MUST(result.sources(0)).size() == 4);
     std::uint32_t bits = MUST(result.source_bits(0, 0)).at(28, 21);
     int count = 0;
@@ -199,7 +200,9 @@ void test_progress() {
               return skep::Flow::Cancel;
           }));
     int calls = 0;
-    const skep::ProgressCallback watch = [&](const skep::Progress &) { return ++calls, skep::Flow::Continue; };
+    const skep::ProgressCallback watch = [&](const skep::Progress &) {
+        return ++calls, skep::Flow::Continue;
+    };
     CHECK(MUST(skep::reconstruct(scene, options, watch)) && calls > 0);
 #ifndef SKEP_NO_EXCEPTIONS
     // The exception goes through the library to whom called it, once, and the run ends early.
@@ -219,7 +222,8 @@ void test_progress() {
     // At the end too, when the result is there already.
     try {
         skep::reconstruct(scene, options, [](const skep::Progress &progress) {
-            if (progress.done >= 1) throw 7;
+            if (progress.done >= 1)
+                throw 7;
         });
         CHECK(false);
     } catch (int seven) {

@@ -51,7 +51,8 @@ static Hit look(double x, double a, double b) {
         const cv::Vec3d ray(a, b, 1), from(x - center[0], -center[1], -center[2]);
         const double half = ray.dot(from) / ray.dot(ray);
         const double root = half * half - (from.dot(from) - radius * radius) / ray.dot(ray);
-        if (root < 0 || -half - std::sqrt(root) >= hit.depth) return;
+        if (root < 0 || -half - std::sqrt(root) >= hit.depth)
+            return;
         const double depth = -half - std::sqrt(root);
         hit = {depth, gray(from[0] + depth * a, from[1] + depth * b, surface)};
     };
@@ -115,10 +116,12 @@ static Scores score(const cv::Mat &truth, const cv::Mat &disparity, const cv::Ma
         for (int column = 0; column < width; ++column) {
             const float right = truth.at<float>(row, column),
                         found = disparity.at<float>(row, column);
-            if (right == 0) continue;
+            if (right == 0)
+                continue;
             const double error = std::abs(found - right);
             ++all, scores.off_or_none += found <= 0 || error > 1;
-            if (found <= 0 || other.at<float>(row, column) <= 0) continue;
+            if (found <= 0 || other.at<float>(row, column) <= 0)
+                continue;
             ++both, scores.mean += error, scores.off += error > 1;
         }
     }

@@ -28,7 +28,8 @@ static Batch made_batch(int hypotheses) {
         if (i % hypotheses == 0)
             batch.pixels.push_back({std::uint32_t(random.uniform(30, width - 30)),
                                     std::uint32_t(random.uniform(30, height - 30))});
-        else batch.pixels.push_back(batch.pixels.back());
+        else
+            batch.pixels.push_back(batch.pixels.back());
         const double slant = random.uniform(-0.2, 0.2), shift = random.uniform(-4.0, 4.0);
         const double x = batch.pixels.back()[0];
         batch.homographies.push_back(
@@ -70,7 +71,8 @@ static void compare(int hypotheses, int step) {
     const skep::PackedImage reference = skep::PackedImage::create(batch.reference);
     const skep::PackedImage source = skep::PackedImage::create(batch.source);
     const double alike = std::numeric_limits<double>::infinity();
-    const skep::NccWindow window = skep::NccWindow::create(radius, std::uint32_t(step), alike, alike);
+    const skep::NccWindow window =
+        skep::NccWindow::create(radius, std::uint32_t(step), alike, alike);
     std::vector<float> ours(patches), theirs(patches);
     // The best of rounds that take turns: what else the machine does slows single rounds of either
     // side.
@@ -94,7 +96,8 @@ static void compare(int hypotheses, int step) {
     CHECK(difference < 0.02); // the same work was done
     // A run samples the reference's side some 14 times a pixel for 300 to 450 comparisons, so 32
     // is what it sees; fewer are told, not judged.
-    if (hypotheses == 32) CHECK(their_best >= 20 * our_best);
+    if (hypotheses == 32)
+        CHECK(their_best >= 20 * our_best);
 }
 
 int main() {

@@ -37,7 +37,7 @@ inline Fallible<void> write_consistency_graph(const std::string &file,
     if (counts.size() != std::size_t(graph.size.width) * graph.size.height)
         return detail::give(
             detail::Status::argument("counts", std::to_string(counts.size()) + " long",
-                                      detail::by(graph.size.width, graph.size.height)));
+                                     detail::by(graph.size.width, graph.size.height)));
     return detail::give(skep_write_consistency_graph(file.c_str(), graph.size.width,
                                                      graph.size.height, counts.data(), views.data(),
                                                      views.size()));

@@ -24,8 +24,10 @@ template <class M> Fallible<Homography> homography(const M &matrix) {
 
 /// Writes a homography into a matrix of Eigen or OpenCV; a cv::Mat becomes one of doubles.
 template <class M> void assign(const Homography &homography, M &matrix) {
-    if constexpr (detail::CanResize<M>::value && detail::IsCalled<M>::value) matrix.resize(3, 3);
-    else if constexpr (detail::CanCreate<M>::value) matrix.create(3, 3, detail::cv_depth<double>());
+    if constexpr (detail::CanResize<M>::value && detail::IsCalled<M>::value)
+        matrix.resize(3, 3);
+    else if constexpr (detail::CanCreate<M>::value)
+        matrix.create(3, 3, detail::cv_depth<double>());
     for (int i = 0; i < 9; ++i) {
         if constexpr (detail::IsCalled<M>::value)
             matrix(i / 3, i % 3) =
@@ -73,15 +75,17 @@ class PackedImage : public detail::Handle<skep_packed_image, skep_packed_image_d
     }
 };
 
-/// The sample positions of a patch and their weights; skep_ncc_window_create explains the arguments.
+/// The sample positions of a patch and their weights; skep_ncc_window_create explains the
+/// arguments.
 class NccWindow : public detail::Handle<skep_ncc_window, skep_ncc_window_destroy> {
   public:
     using Handle::Handle;
-    static Fallible<NccWindow> create(std::uint32_t radius, std::uint32_t step, double sigma_spatial,
-                                   double sigma_color, double min_variance = 1e-5) {
+    static Fallible<NccWindow> create(std::uint32_t radius, std::uint32_t step,
+                                      double sigma_spatial, double sigma_color,
+                                      double min_variance = 1e-5) {
         NccWindow window;
         return detail::give(skep_ncc_window_create(radius, step, sigma_spatial, sigma_color,
-                                               min_variance, window.put()),
+                                                   min_variance, window.put()),
                             window);
     }
 };

@@ -22,8 +22,10 @@ class ProgressCallback {
         static_assert(std::is_void_v<Answer> || std::is_same_v<Answer, Flow>,
                       "callbacks return nothing or a skep::Flow");
         callback_ = [callback = std::move(callback)](const Progress &progress) mutable {
-            if constexpr (std::is_void_v<Answer>) return callback(progress), Flow::Continue;
-            else return callback(progress);
+            if constexpr (std::is_void_v<Answer>)
+                return callback(progress), Flow::Continue;
+            else
+                return callback(progress);
         };
     }
 
@@ -32,7 +34,8 @@ class ProgressCallback {
         Running running{callback_, nullptr};
         detail::Status status =
             call(callback_ ? &Running::report : nullptr, static_cast<void *>(&running));
-        if (running.thrown) std::rethrow_exception(running.thrown);
+        if (running.thrown)
+            std::rethrow_exception(running.thrown);
         return status;
     }
 
@@ -43,7 +46,8 @@ class ProgressCallback {
 
         static std::int32_t report(void *user, const skep_progress *progress) noexcept {
             auto &self = *static_cast<Running *>(user);
-            if (self.thrown) return 1;
+            if (self.thrown)
+                return 1;
 #ifdef SKEP_NO_EXCEPTIONS
             return self.callback(*progress) == Flow::Cancel;
 #else
@@ -68,7 +72,8 @@ template <class Raw, void (*destroy)(Raw *)> class Handle {
     explicit Handle(Raw *raw) noexcept : raw_(raw) {}
     Handle(Handle &&other) noexcept : raw_(other.release()) {}
     Handle &operator=(Handle &&other) noexcept {
-        if (this != &other) destroy(std::exchange(raw_, other.release()));
+        if (this != &other)
+            destroy(std::exchange(raw_, other.release()));
         return *this;
     }
     ~Handle() { destroy(raw_); }

@@ -61,7 +61,8 @@ enum class Maps : std::uint32_t { Raw = SKEP_MAPS_RAW, Validated = SKEP_MAPS_VAL
 /// Maps of views, and the cloud when they come from a whole run.
 ///
 /// Maps are copied into what the caller passes, which may be a cv::Mat, or are returned as a
-/// skep::Map. The borrow_ functions return views of the result's own memory, valid as long as it lives.
+/// skep::Map. The borrow_ functions return views of the result's own memory, valid as long as it
+/// lives.
 class Result : public detail::Handle<skep_result, skep_result_destroy> {
   public:
     using Handle::Handle;
@@ -160,7 +161,7 @@ class Result : public detail::Handle<skep_result, skep_result_destroy> {
   private:
     template <class T, class Call, class M, class... Where>
     detail::Status copy(Call call, std::uint32_t channels, M &map, std::uint32_t view,
-                         Where... where) const {
+                        Where... where) const {
         Size size;
         MapView<T> into;
         return detail::Status(skep_result_get_size(get(), view, &size.width, &size.height))
@@ -220,8 +221,8 @@ inline Fallible<Cloud> fuse(Span<const FusionView> views, OptionsOrDefault optio
         if (status && (depth.width != normal.width || depth.height != normal.height))
             status =
                 detail::Status::argument("views[" + std::to_string(raw.size()) + "].normal",
-                                          detail::by(normal.width, normal.height),
-                                          detail::by(depth.width, depth.height) + ", as the depth");
+                                         detail::by(normal.width, normal.height),
+                                         detail::by(depth.width, depth.height) + ", as the depth");
         raw.push_back({&view.camera, depth.width, depth.height, depth.data, depth.stride_bytes,
                        normal.data, normal.stride_bytes, view.image ? &*view.image : nullptr,
                        view.overlap.data(), view.overlap.size()});

@@ -74,9 +74,9 @@ class Scene : public detail::Handle<skep_scene, skep_scene_destroy> {
     Fallible<void> add_points(Span<const double> positions, Span<const std::uint32_t> view_counts,
                               Span<const std::uint32_t> views) {
         if (positions.size() != 3 * view_counts.size())
-            return detail::give(
-                detail::Status::argument("positions", std::to_string(positions.size()) + " long",
-                                          std::to_string(3 * view_counts.size())));
+            return detail::give(detail::Status::argument("positions",
+                                                         std::to_string(positions.size()) + " long",
+                                                         std::to_string(3 * view_counts.size())));
         return detail::give(skep_scene_add_points(get(), positions.data(), view_counts.size(),
                                                   view_counts.data(), views.data(), views.size()));
     }

@@ -27,7 +27,7 @@ class Estimate : public detail::Handle<skep_estimate, skep_estimate_destroy> {
             maps.depth.resize(pixels), maps.normal.resize(3 * pixels);
             maps.cost.resize(pixels), maps.validated.resize(pixels);
             return skep_estimate_get_maps(get(), maps.depth.data(), maps.normal.data(),
-                                       maps.cost.data(), maps.validated.data(), pixels);
+                                          maps.cost.data(), maps.validated.data(), pixels);
         });
         return detail::give(std::move(status), maps);
     }
@@ -77,32 +77,39 @@ class Stepper : public detail::Handle<skep_stepper, skep_stepper_destroy> {
             [&](auto... out) { return skep_stepper_get_sources(get(), view, out...); });
     }
     Fallible<Candidates> propagate(std::uint32_t cycle, std::uint32_t view,
-                               Span<const Estimate> estimates) const {
+                                   Span<const Estimate> estimates) const {
         Candidates candidates;
         const Raw raw(estimates);
         return detail::give(
-            skep_stepper_propagate(get(), cycle, view, raw.data(), raw.size(), candidates.put()), candidates);
+            skep_stepper_propagate(get(), cycle, view, raw.data(), raw.size(), candidates.put()),
+            candidates);
     }
     /// Candidates may be empty. The estimate is to be checked before anything else.
-    Fallible<Estimate> search(std::uint32_t cycle, std::uint32_t view, Span<const Estimate> estimates,
-                           const Candidates &candidates = Candidates(), const ProgressCallback &progress = {}) const {
+    Fallible<Estimate> search(std::uint32_t cycle, std::uint32_t view,
+                              Span<const Estimate> estimates,
+                              const Candidates &candidates = Candidates(),
+                              const ProgressCallback &progress = {}) const {
         Estimate estimate;
         const Raw raw(estimates);
         detail::Status status = progress.run([&](skep_progress_fn callback, void *user) {
             return skep_stepper_search(get(), cycle, view, raw.data(), raw.size(), candidates.get(),
-                                     callback, user, estimate.put());
+                                       callback, user, estimate.put());
         });
         return detail::give(std::move(status), estimate);
     }
-    Fallible<Estimate> check(std::uint32_t cycle, std::uint32_t view, Span<const Estimate> estimates) const {
+    Fallible<Estimate> check(std::uint32_t cycle, std::uint32_t view,
+                             Span<const Estimate> estimates) const {
         Estimate estimate;
         const Raw raw(estimates);
         return detail::give(
-            skep_stepper_check(get(), cycle, view, raw.data(), raw.size(), estimate.put()), estimate);
+            skep_stepper_check(get(), cycle, view, raw.data(), raw.size(), estimate.put()),
+            estimate);
     }
-    Fallible<Estimate> upsample(std::uint32_t cycle, std::uint32_t view, const Estimate &estimate) const {
+    Fallible<Estimate> upsample(std::uint32_t cycle, std::uint32_t view,
+                                const Estimate &estimate) const {
         Estimate finer;
-        return detail::give(skep_stepper_upsample(get(), cycle, view, estimate.get(), finer.put()), finer);
+        return detail::give(skep_stepper_upsample(get(), cycle, view, estimate.get(), finer.put()),
+                            finer);
     }
     /// The cycle after this one; nothing after the last.
     Fallible<std::optional<std::uint32_t>> next(std::uint32_t cycle,
@@ -111,7 +118,8 @@ class Stepper : public detail::Handle<skep_stepper, skep_stepper_destroy> {
         const Raw raw(estimates);
         detail::Status status = skep_stepper_next(get(), cycle, raw.data(), raw.size(), &next);
         std::optional<std::uint32_t> found;
-        if (next != SKEP_CYCLE_NONE) found = next;
+        if (next != SKEP_CYCLE_NONE)
+            found = next;
         return detail::give(std::move(status), found);
     }
     Fallible<Result> finish(std::uint32_t view, Span<const Estimate> estimates,
@@ -120,7 +128,7 @@ class Stepper : public detail::Handle<skep_stepper, skep_stepper_destroy> {
         const Raw raw(estimates);
         detail::Status status = progress.run([&](skep_progress_fn callback, void *user) {
             return skep_stepper_finish(get(), view, raw.data(), raw.size(), callback, user,
-                                     result.put());
+                                       result.put());
         });
         return detail::give(std::move(status), result);
     }
@@ -128,9 +136,10 @@ class Stepper : public detail::Handle<skep_stepper, skep_stepper_destroy> {
     /// where the plane counts as validated, and a map of costs. An empty Map stands for none.
     template <class Depth, class Normal, class Validated = Map<std::uint8_t>,
               class Cost = Map<float>>
-    Fallible<Estimate> estimate_from_maps(std::uint32_t cycle, std::uint32_t view, const Depth &depth,
-                                    const Normal &normal, const Validated &validated = {},
-                                    const Cost &cost = {}) const {
+    Fallible<Estimate> estimate_from_maps(std::uint32_t cycle, std::uint32_t view,
+                                          const Depth &depth, const Normal &normal,
+                                          const Validated &validated = {},
+                                          const Cost &cost = {}) const {
         Estimate estimate;
         Size size;
         MapView<const float> depths, normals, costs;
@@ -147,17 +156,18 @@ class Stepper : public detail::Handle<skep_stepper, skep_stepper_destroy> {
                     return is_none(cost) ? detail::Status() : sized(cost, size, 1, "cost", costs);
                 })
                 .then([&] {
-                    return skep_estimate_from_maps(get(), cycle, view, depths.data, depths.stride_bytes,
-                                                normals.data, normals.stride_bytes, verdicts.data,
-                                                verdicts.stride_bytes, costs.data,
-                                                costs.stride_bytes, estimate.put());
+                    return skep_estimate_from_maps(
+                        get(), cycle, view, depths.data, depths.stride_bytes, normals.data,
+                        normals.stride_bytes, verdicts.data, verdicts.stride_bytes, costs.data,
+                        costs.stride_bytes, estimate.put());
                 });
         return detail::give(std::move(status), estimate);
     }
     /// An estimate from the bytes of Estimate::save.
     Fallible<Estimate> load(Span<const std::uint8_t> bytes) const {
         Estimate estimate;
-        return detail::give(skep_estimate_load(get(), bytes.data(), bytes.size(), estimate.put()), estimate);
+        return detail::give(skep_estimate_load(get(), bytes.data(), bytes.size(), estimate.put()),
+                            estimate);
     }
 
   private:
@@ -169,15 +179,18 @@ class Stepper : public detail::Handle<skep_stepper, skep_stepper_destroy> {
     };
     template <class T, class M>
     static detail::Status sized(const M &map, Size size, std::uint32_t channels, const char *name,
-                                 MapView<T> &view) {
+                                MapView<T> &view) {
         return detail::view_of<T>(map, channels, name, view).then([&] {
             return detail::make<T>(view, size, channels, name, view);
         });
     }
     template <class M> static bool is_none(const M &map) {
-        if constexpr (detail::IsMat<const M>::value) return map.data == nullptr;
-        else if constexpr (std::is_pointer_v<decltype(map.data)>) return map.data == nullptr;
-        else return map.data.empty();
+        if constexpr (detail::IsMat<const M>::value)
+            return map.data == nullptr;
+        else if constexpr (std::is_pointer_v<decltype(map.data)>)
+            return map.data == nullptr;
+        else
+            return map.data.empty();
     }
 };
 

@@ -1,6 +1,6 @@
-//! Where the fields of the interface's structs lie, which compiled programs rely on. `ffi-tests/header/layout.inc`
-//! holds it; the test here compares that with what Rust makes of the source, a C program with what C makes of the
-//! header. `SKEP_UPDATE_HEADER=1 cargo test layout` writes it anew.
+//! Where the fields of the interface's structs lie, which compiled programs rely on.
+//! `ffi-tests/header/layout.inc` holds it; the test here compares that with what Rust makes of the source, a
+//! C program with what C makes of the header. `SKEP_UPDATE_HEADER=1 cargo test layout` writes it anew.
 
 use super::camera::skep_camera;
 use super::estimate::skep_estimate_info;

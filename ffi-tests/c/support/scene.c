@@ -14,17 +14,13 @@ static vec3 add(vec3 a, vec3 b, double scale) {
     return (vec3){a.x + b.x * scale, a.y + b.y * scale, a.z + b.z * scale};
 }
 
-static double dot(vec3 a, vec3 b) {
-    return a.x * b.x + a.y * b.y + a.z * b.z;
-}
+static double dot(vec3 a, vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 static vec3 cross(vec3 a, vec3 b) {
     return (vec3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-static vec3 unit(vec3 a) {
-    return add((vec3){0, 0, 0}, a, 1 / sqrt(dot(a, a)));
-}
+static vec3 unit(vec3 a) { return add((vec3){0, 0, 0}, a, 1 / sqrt(dot(a, a))); }
 
 /* A piece of a plane with two axes on it, as wide as `half` says. */
 typedef struct panel {
@@ -41,9 +37,7 @@ static panel make_panel(vec3 center, vec3 normal, double half_u, double half_v) 
 const double SCENE_NEAR = 2.0;
 const double SCENE_FAR = 9.0;
 
-static panel wall(void) {
-    return make_panel((vec3){0, 0, 5}, (vec3){0.35, 0.1, -1}, 100, 100);
-}
+static panel wall(void) { return make_panel((vec3){0, 0, 5}, (vec3){0.35, 0.1, -1}, 100, 100); }
 
 static panel board(void) {
     return make_panel((vec3){0.25, -0.1, 3.7}, (vec3){-0.1, 0.15, -1}, 0.65, 0.5);
@@ -238,9 +232,7 @@ void scene_make_sized(scene *made, uint32_t views, uint32_t width, uint32_t heig
     make_points(made);
 }
 
-int scene_is_small(void) {
-    return getenv("SKEP_TEST_SMALL") != NULL;
-}
+int scene_is_small(void) { return getenv("SKEP_TEST_SMALL") != NULL; }
 
 void scene_make(scene *made) {
     if (scene_is_small()) {
@@ -263,9 +255,7 @@ void scene_free(scene *made) {
     free(made->point_views);
 }
 
-size_t scene_pixels(const scene *made) {
-    return (size_t)made->width * made->height;
-}
+size_t scene_pixels(const scene *made) { return (size_t)made->width * made->height; }
 
 skep_image scene_image(const scene *made, uint32_t view) {
     return (skep_image){.data = made->photographs[view].rgb,
