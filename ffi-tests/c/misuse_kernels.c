@@ -59,8 +59,8 @@ static void check_windows(void) {
     FAILS(skep_ncc_window_create(5, 2, 5, 0.2, 1e-5, NULL), SKEP_ERR_NULL, "window_out");
     FAILS(skep_ncc_window_create(0, 2, 5, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "radius is 0");
     FAILS(skep_ncc_window_create(17, 2, 5, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "radius is 17");
-    FAILS(skep_ncc_window_create(5, 0, 5, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "cycle is 0");
-    FAILS(skep_ncc_window_create(5, 9, 5, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "cycle is 9");
+    FAILS(skep_ncc_window_create(5, 0, 5, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "step is 0");
+    FAILS(skep_ncc_window_create(5, 9, 5, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "step is 9");
     FAILS(skep_ncc_window_create(5, 2, 0, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "sigma_spatial");
     FAILS(skep_ncc_window_create(5, 2, NAN, 0.2, 1e-5, out), SKEP_ERR_ARGUMENT, "sigma_spatial");
     FAILS(skep_ncc_window_create(5, 2, 5, -1, 1e-5, out), SKEP_ERR_ARGUMENT, "sigma_color");

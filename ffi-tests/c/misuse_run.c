@@ -17,12 +17,12 @@ static void check_runs(const skep_scene *handed_in) {
           "scene");
     FAILS(skep_reconstruct(handed_in, options, NULL, NULL, NULL), SKEP_ERR_NULL, "result_out");
     /* Options that are right alone and wrong together. */
-    REQUIRE(skep_options_set(options, "triangulation_angle.min", 90));
+    REQUIRE(skep_options_set(options, "min_triangulation_angle", 90));
     FAILS(skep_reconstruct(handed_in, options, NULL, NULL, OUT(skep_result *, 0)),
-          SKEP_ERR_ARGUMENT, "triangulation_angle.max");
+          SKEP_ERR_ARGUMENT, "max_triangulation_angle");
     FAILS(skep_stepper_create(handed_in, options, OUT(skep_stepper *, 0)), SKEP_ERR_ARGUMENT,
           "triangulation_angle");
-    REQUIRE(skep_options_set(options, "triangulation_angle.min", 4));
+    REQUIRE(skep_options_set(options, "min_triangulation_angle", 4));
     REQUIRE(skep_options_set(options, "max_views_per_pixel", 1));
     FAILS(skep_reconstruct(handed_in, options, NULL, NULL, OUT(skep_result *, 0)),
           SKEP_ERR_ARGUMENT, "max_views_per_pixel");

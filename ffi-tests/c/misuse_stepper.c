@@ -85,7 +85,7 @@ static void check_estimate_lists(const stage *at) {
     check_estimate_list(at, at->last, swapped, views, SKEP_ERR_ARGUMENT,
                         "estimates[0] is the estimate of view 1");
     check_estimate_list(at, at->last, (estimate_list)at->coarse, views, SKEP_ERR_ARGUMENT,
-                        "handed up");
+                        "coarser scale");
     check_estimate_list(at, 0, (estimate_list)at->fine, views, SKEP_ERR_ARGUMENT, "estimates[0]");
     check_estimate_list(at, at->last + 1, (estimate_list)at->fine, views, SKEP_ERR_ARGUMENT,
                         "cycle is");
@@ -118,7 +118,7 @@ static void check_order(const stage *at) {
           SKEP_ERR_ARGUMENT, "estimates[0]");
     FAILS(skep_stepper_finish(stepper, 99, coarse, views, NULL, NULL, OUT(skep_result *, 0)),
           SKEP_ERR_ARGUMENT, "view is 99");
-    /* Estimates are handed up to the next scale only, and keep their view. */
+    /* Estimates are upsampled to the next scale only, and keep their view. */
     FAILS(skep_stepper_upsample(stepper, 1, 0, coarse[0], OUT(skep_estimate *, 0)),
           SKEP_ERR_ARGUMENT, "scale before");
     FAILS(skep_stepper_upsample(stepper, at->last, 1, coarse[0], OUT(skep_estimate *, 0)),

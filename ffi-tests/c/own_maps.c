@@ -80,7 +80,7 @@ static size_t right(const photograph *truth, const float *depth, size_t pixels) 
     return count;
 }
 
-/* A view with no state of its own takes the planes that the others' true maps offer it. */
+/* A view with no planes of its own takes those that are transferred from the others' true maps. */
 static void check_guidance(const scene *made, const skep_stepper *stepper, uint32_t cycle,
                            skep_estimate **estimates) {
     const size_t pixels = scene_pixels(made);
@@ -91,16 +91,16 @@ static void check_guidance(const scene *made, const skep_stepper *stepper, uint3
     REQUIRE(skep_estimate_from_maps(stepper, cycle, 0, nothing, 4 * made->width, truth->normal,
                                     12 * made->width, NULL, 0, NULL, 0, &estimates[0]));
     size_t found[2];
-    for (int is_offered = 0; is_offered < 2; ++is_offered) {
+    for (int is_given = 0; is_given < 2; ++is_given) {
         skep_candidates *candidates = NULL;
         skep_estimate *searched = NULL;
         REQUIRE(skep_stepper_propagate(stepper, cycle, 0, (const skep_estimate *const *)estimates,
                                        made->views, &candidates));
         REQUIRE(skep_stepper_search(stepper, cycle, 0, (const skep_estimate *const *)estimates,
-                                    made->views, is_offered ? candidates : NULL, NULL, NULL,
+                                    made->views, is_given ? candidates : NULL, NULL, NULL,
                                     &searched));
         REQUIRE(skep_estimate_get_maps(searched, depth, NULL, NULL, NULL, pixels));
-        found[is_offered] = right(truth, depth, pixels);
+        found[is_given] = right(truth, depth, pixels);
         skep_estimate_info info;
         REQUIRE(skep_estimate_get_info(searched, &info));
         CHECK(info.is_checked == 0 && info.validated == 0 && info.ncc_evaluations > pixels,

@@ -1,5 +1,5 @@
 /*
- * A run taken step by cycle gives the same bits as a whole one, in any order of the views, and
+ * A run taken cycle by cycle gives the same bits as a whole one, in any order of the views, and
  * across saved estimates.
  */
 #include "support/check.h"

@@ -99,7 +99,7 @@ Vector ray(const skep_camera &camera, double x, double y) {
 }
 
 // A camera at a place that looks at another, upright but for a small turn about its axis.
-skep_camera look(const Vector &from, const Vector &at, double turn) {
+skep_camera look_at(const Vector &from, const Vector &at, double turn) {
     const Vector forward = unit(plus(at, from, -1));
     const Vector right = unit(cross({std::sin(turn), std::cos(turn), 0}, forward));
     const Vector rows[3] = {right, cross(forward, right), forward};
@@ -187,8 +187,8 @@ Scene make() {
         // Sizes, focal lengths and principal points differ, so that none can stand in for another.
         view.width = index == 4 ? 148 : 160;
         view.height = index == 4 ? 128 : 120;
-        view.camera =
-            look({0.55 * column, 0.6 * row, 0.05 * column}, {0.1 * column, 0, 4.5}, 0.05 * column);
+        view.camera = look_at({0.55 * column, 0.6 * row, 0.05 * column}, {0.1 * column, 0, 4.5},
+                              0.05 * column);
         view.camera.fx = 150.5;
         view.camera.fy = 152.25;
         view.camera.cx = view.width / 2.0 - 1.75;

@@ -31,15 +31,15 @@ void test_kernels() {
         CHECK(std::abs(world::center(source)[i] + farther * at_source[i] - point) < 1e-9);
     }
 
-    const auto look = [](const std::vector<std::uint8_t> &pixels) {
+    const auto image = [](const std::vector<std::uint8_t> &pixels) {
         return skep_image{pixels.data(), world::width, world::height, world::width,
                           SKEP_FORMAT_GRAY};
     };
     const auto reference_picture = world::picture(reference, world::width, world::height);
     const auto source_picture = world::picture(source, world::width, world::height);
     const skep::PackedImage reference_samples =
-        MUST(skep::PackedImage::create(look(reference_picture)));
-    const skep::PackedImage source_samples = MUST(skep::PackedImage::create(look(source_picture)));
+        MUST(skep::PackedImage::create(image(reference_picture)));
+    const skep::PackedImage source_samples = MUST(skep::PackedImage::create(image(source_picture)));
     const double all_alike = std::numeric_limits<double>::infinity();
     const skep::NccWindow window = MUST(skep::NccWindow::create(5, 1, all_alike, all_alike));
     const skep::Homography identity = {1, 0, 0, 0, 1, 0, 0, 0, 1};

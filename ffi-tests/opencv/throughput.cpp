@@ -95,7 +95,7 @@ static void compare(int hypotheses, int step) {
         difference += std::abs(ours[i] - theirs[i]) / patches;
     CHECK(difference < 0.02); // the same work was done
     // A run samples the reference's side some 14 times a pixel for 300 to 450 comparisons, so 32
-    // is what it sees; fewer are told, not judged.
+    // is what counts; fewer are printed, not checked.
     if (hypotheses == 32)
         CHECK(their_best >= 20 * our_best);
 }

@@ -1,4 +1,4 @@
-// Makes a tiny scene for the example in C++, or looks at what the example made of it:
+// Makes a tiny scene for the example in C++, or checks what the example made of it:
 //   program FOLDER [CLOUD PICTURE]
 #include "../cpp/world.hpp"
 #include "pictures.hpp"

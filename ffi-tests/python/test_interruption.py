@@ -1,4 +1,4 @@
-"""How long calls show where they stand, and how they are stopped."""
+"""Progress and cancellation of long calls."""
 
 import os
 import signal
