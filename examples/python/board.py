@@ -27,7 +27,10 @@ pictures.mkdir(parents=True, exist_ok=True)
 scene = skep.Scene.read_colmap(folder)
 for view in range(len(scene)):
     near, far = scene.depth_range(view)
-    print(f"{scene.name(view)}: {scene.size(view)}, depth {near:.2f} to {far:.2f}, sources {scene.sources(view)}")
+    print(
+        f"{scene.name(view)}: {scene.size(view)}, depth {near:.2f} to {far:.2f}, "
+        f"sources {scene.sources(view)}"
+    )
 
 # %% The run; Ctrl-C stops it
 options = skep.Options()

@@ -20,7 +20,14 @@ def test_progress_comes_in_the_callers_thread_and_grows(scene):
         told.append(progress)
         threads.add(threading.get_ident())
 
-    skep.reconstruct(scene, skep.Options(schedule_scales="downscale=2 food_sources=3 iterations=2+1x1; downscale=1 food_sources=3 iterations=1+1x1", threads=2), progress)
+    skep.reconstruct(
+        scene,
+        skep.Options(
+            schedule_scales=made.TWO_SCALES,
+            threads=2,
+        ),
+        progress,
+    )
     assert threads == {threading.get_ident()}
     done = [progress.done for progress in told]
     assert done == sorted(done) and 0 <= done[0] and done[-1] <= 1

@@ -7,16 +7,14 @@ import numpy as np
 import pytest
 import skep
 
-SCALES = "downscale=2 food_sources=3 iterations=2+1x1; downscale=1 food_sources=3 iterations=1+1x1"
-
 
 @pytest.fixture(scope="module")
 def options():
-    return skep.Options(threads=2, schedule_scales=SCALES, fusion_min_views=2)
+    return skep.Options(threads=2, schedule_scales=made.TWO_SCALES, fusion_min_views=2)
 
 
 def run_by_hand(stepper, save=False):
-    """All cycles as the documentation lists them, views at the same time; with `save`, estimates go through bytes."""
+    """All cycles in the documented order, views in parallel; with `save`, estimates go through bytes."""
     views = range(stepper.view_count)
     estimates, cycle = [], 0
     with ThreadPoolExecutor(3) as pool:
@@ -53,7 +51,10 @@ def test_an_estimate_knows_its_view_and_its_cycle(scene, options):
     stepper = skep.Stepper(scene, options)
     assert (len(stepper), stepper.view_count) == (4, len(scene))
     assert stepper[0] == skep.Cycle(downscale=2, cycle_on_scale=0, food_sources=3, iterations=2)
-    assert stepper.size(0, 0) == (made.WIDTH // 2, made.HEIGHT // 2) and stepper.size(3, 0) == (made.WIDTH, made.HEIGHT)
+    assert stepper.size(0, 0) == (made.WIDTH // 2, made.HEIGHT // 2) and stepper.size(3, 0) == (
+        made.WIDTH,
+        made.HEIGHT,
+    )
     searched = [stepper.search(0, view) for view in range(len(scene))]
     checked = stepper.check(0, 2, searched)
     assert not searched[2].info.is_checked and checked.info.is_checked
@@ -112,10 +113,15 @@ def test_patches_match_best_at_the_true_plane():
     np.testing.assert_allclose(itself, 1, atol=1e-4)
 
     def ncc(factor):
-        normals, depths = first.normal[pixels[:, 1], pixels[:, 0]], first.depth[pixels[:, 1], pixels[:, 0]] * factor
+        normals, depths = (
+            first.normal[pixels[:, 1], pixels[:, 0]],
+            first.depth[pixels[:, 1], pixels[:, 0]] * factor,
+        )
         at = zip(pixels, depths, normals)
         planes = [skep.plane_through(first.camera, x, y, depth, normal) for (x, y), depth, normal in at]
-        return skep.patch_ncc(window, *images, pixels, skep.plane_homographies(first.camera, second.camera, planes))
+        return skep.patch_ncc(
+            window, *images, pixels, skep.plane_homographies(first.camera, second.camera, planes)
+        )
 
     assert (ncc(1) > 0.9).all() and (ncc(1) > ncc(1.1)).all() and (ncc(1) > ncc(0.9)).all()
     assert skep.patch_ncc(window, *images, np.zeros((0, 2), int), np.zeros((0, 3, 3))).shape == (0,)

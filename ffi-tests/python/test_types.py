@@ -42,7 +42,15 @@ skep.Options("best")  # wrong
 
 
 def mypy(*arguments):
-    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", os.path.join(ROOT, "target/mypy"), *arguments]
+    command = [
+        sys.executable,
+        "-m",
+        "mypy",
+        "--strict",
+        "--cache-dir",
+        os.path.join(ROOT, "target/mypy"),
+        *arguments,
+    ]
     return subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
 
 

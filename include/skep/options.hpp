@@ -2,17 +2,17 @@
 //
 // BEGIN OPTIONS
 //
-// Of the whole run.
+// Of the whole run:
 //   seed
 //       Seed of the random generator; the same seed gives the same bits.
-//       (whole number, 0 to 18446744073709551615, any; default: 0)
+//       whole number, 0 to 18446744073709551615, any; default: 0
 //   threads
 //       Worker threads; 0 takes one for each core. The result does not depend on it.
-//       (whole number, 0 to 4096, threads; default: 0)
+//       whole number, 0 to 4096, threads; default: 0
 //   simd
 //       Instruction set: scalar, baseline, v3, or best for the best the machine has; the result does not
 //       depend on it.
-//       (name; default: best)
+//       default: best
 //
 // Schedule: the scales of a run and the cycles on each.
 //   schedule.scales
@@ -20,169 +20,169 @@
 //       `downscale=2 food_sources=3 iterations=5+4x1; downscale=1 food_sources=2 iterations=1+2x1` is half
 //       size with 3 food sources a pixel, 5 iterations in the first cycle and 4 more cycles of 1, then full
 //       size.
-//       (text; default: downscale=2 food_sources=3 iterations=5+4x1; downscale=1 food_sources=2
-//       iterations=1+2x1, fast: downscale=2 food_sources=2 iterations=4+3x1; downscale=1 food_sources=2
-//       iterations=0+0x1, paper: downscale=1 food_sources=10 iterations=20+3x2)
+//       default: downscale=2 food_sources=3 iterations=5+4x1; downscale=1 food_sources=2 iterations=1+2x1
+//       fast: downscale=2 food_sources=2 iterations=4+3x1; downscale=1 food_sources=2 iterations=0+0x1
+//       paper: downscale=1 food_sources=10 iterations=20+3x2
 //   schedule.min_changed_fraction
 //       A scale ends early once fewer than this fraction of the pixels changed in a cycle.
-//       (number, 0 to 1, fraction of the pixels; default: 0.01)
+//       number, 0 to 1, fraction of the pixels; default: 0.01
 //
 // Window: which samples make a patch and how they are weighted.
 //   window.window_radius
 //       Half the side of the window.
-//       (whole number, 1 to 16, pixels; default: 5)
+//       whole number, 1 to 16, pixels; default: 5
 //   window.full_size_window_radius
 //       The same at full size after coarser scales, where the window is a square; 0 keeps `window_radius`.
-//       (whole number, 0 to 16, pixels; default: 3, paper: 0)
+//       whole number, 0 to 16, pixels; default: 3, paper: 0
 //   window.window_step
 //       Distance between the samples of the window.
-//       (whole number, 1 to 8, pixels; default: 2)
+//       whole number, 1 to 8, pixels; default: 2
 //   window.circular_window
 //       Leave out the corners of the window: a disc of samples instead of a square.
-//       (switch, true or false; default: true, paper: false)
+//       switch, true or false; default: true, paper: false
 //   window.sigma_spatial
 //       Sigma of the bilateral weight in space.
-//       (number, 0.001 to 1000000, pixels; default: 3, paper: 5)
+//       number, 0.001 to 1000000, pixels; default: 3, paper: 5
 //   window.sigma_color
 //       Sigma of the bilateral weight in gray value.
-//       (number, 0.001 to 1000000, gray value, of [0, 1]; default: 0.03, paper: 0.2)
+//       number, 0.001 to 1000000, gray value, of [0, 1]; default: 0.03, paper: 0.2
 //   window.min_variance
 //       Weighted variance under which a window has no texture and costs 2.
-//       (number, 0 to 1, squared gray value, of [0, 1]; default: 0.00001)
+//       number, 0 to 1, squared gray value, of [0, 1]; default: 0.00001
 //   window.min_texture_to_noise
 //       Ratio of the window's variance to the image noise under which the pixel is not matched but filled
 //       from the surrounding planes; 0 matches all pixels.
-//       (number, 0 to 1000, ratio of variances; default: 2.5, paper: 0)
+//       number, 0 to 1000, ratio of variances; default: 2.5, paper: 0
 //
 // Cost: how the costs of the source views become the cost of a plane, and what is added to it.
 //   cost.best_views
 //       Mean over the best views of the pixel's view set; 0 takes the sum over all divided by one less than
 //       their number (equation 3 of the paper).
-//       (whole number, 0 to 8, views; default: 4, fast: 3, paper: 0)
+//       whole number, 0 to 8, views; default: 4, fast: 3, paper: 0
 //   cost.max_views_per_pixel
 //       From the second cycle on, match a pixel only with this many views of its set, those of lowest cost; 0
 //       takes the whole set.
-//       (whole number, at least 0, views; default: 5, fast: 4, paper: 0)
+//       whole number, at least 0, views; default: 5, fast: 4, paper: 0
 //   cost.geom_consistency_weight
 //       Geometric consistency: cost at the largest error against the validated depth of a source view; 0
 //       turns the term off.
-//       (number, 0 to 1000, cost; default: 0.3, paper: 0)
+//       number, 0 to 1000, cost; default: 0.3, paper: 0
 //   cost.geom_consistency_max_error
 //       Relative depth error against a source view's validated depth at which the penalty saturates;
 //       quadratic below.
-//       (number, 0.00001 to 10, fraction of the depth; default: 0.02, paper: 0.03)
+//       number, 0.00001 to 10, fraction of the depth; default: 0.02, paper: 0.03
 //   cost.geom_consistency_missing_error
 //       Relative depth error that is assumed where the source view has no validated depth.
-//       (number, 0 to 10, fraction of the depth; default: 0.0175, paper: 0.015)
+//       number, 0 to 10, fraction of the depth; default: 0.0175, paper: 0.015
 //   cost.smoothness_weight
 //       Smoothness: cost of a plane that contradicts the validated planes of all four neighbors of similar
 //       gray value; 0 turns the term off.
-//       (number, 0 to 1000, cost; default: 0.1, fast: 0.2, paper: 0)
+//       number, 0 to 1000, cost; default: 0.1, fast: 0.2, paper: 0
 //   cost.smoothness_max_depth_error
 //       Relative depth error against a neighbor's plane at which the smoothness penalty saturates; quadratic
 //       below.
-//       (number, 0.000001 to 1, fraction of the depth; default: 0.01)
+//       number, 0.000001 to 1, fraction of the depth; default: 0.01
 //   cost.smoothness_max_normal_error
 //       Angle to a neighbor's normal at which the smoothness penalty saturates; quadratic in 1 - cos below.
-//       (number, 0.001 to 180, degrees; default: 40)
+//       number, 0.001 to 180, degrees; default: 40
 //
 // Search: the Artificial Multi-Bee Colony of each pixel.
 //   search.trial_limit
 //       Failed attempts to improve a food source after which a scout bee may replace it.
-//       (whole number, at least 0, attempts; default: 10)
+//       whole number, at least 0, attempts; default: 10
 //   search.employed_bees
 //       From the second cycle on, the number of food sources, best first, that employed bees perturb; 0 takes
 //       all.
-//       (whole number, 0 to 64, food sources; default: 1, paper: 0)
+//       whole number, 0 to 64, food sources; default: 1, paper: 0
 //   search.onlooker_tournament_size
 //       Random neighbors of which an onlooker bee visits the one of lowest cost; different gray values raise
 //       the cost.
-//       (whole number, 1 to 20, neighbors; default: 3, fast: 6, paper: 1)
+//       whole number, 1 to 20, neighbors; default: 3, fast: 6, paper: 1
 //   search.local_plane_tolerance
 //       Relative inverse-depth error up to which a neighbor takes part in the local plane fit of each
 //       iteration; 0 fits no planes.
-//       (number, 0 to 1, fraction of the inverse depth; default: 0.02, fast: 0.03, paper: 0)
+//       number, 0 to 1, fraction of the inverse depth; default: 0.02, fast: 0.03, paper: 0
 //   search.depth_perturbation
 //       From the second cycle on, half the range of inverse depths in which food sources start around the
 //       previous estimate, halved each cycle; 0 starts them at random.
-//       (number, 0 to 0.5, fraction of the inverse depth; default: 0.01, fast: 0.005, paper: 0)
+//       number, 0 to 0.5, fraction of the inverse depth; default: 0.01, fast: 0.005, paper: 0
 //   search.normal_perturbation
 //       Half the side of the cube from which a vector is added to the normals of those food sources, halved
 //       each cycle.
-//       (number, 0 to 10, length, of a unit normal; default: 0.3, paper: 0)
+//       number, 0 to 10, length, of a unit normal; default: 0.3, paper: 0
 //   search.smoothness_reward
 //       Fitness bonus of a plane that comes from a validated neighbor, in the comparison only (section 5.6 of
 //       the paper); 0 turns it off.
-//       (number, 0 to 1, fitness; default: 0.05)
+//       number, 0 to 1, fitness; default: 0.05
 //   search.view_propagation
 //       Propagate consistent planes to the pixels of other views that have no validated plane.
-//       (switch, true or false; default: true)
+//       switch, true or false; default: true
 //
 // View selection: the source views of a view, and of each of its pixels.
 //   view_selection.pixelwise_view_selection
 //       Refine the view set of each pixel by incident angle and visibility; off keeps all source views.
-//       (switch, true or false; default: true)
+//       switch, true or false; default: true
 //   view_selection.min_triangulation_angle
 //       Smallest triangulation angle of a source view.
-//       (number, 0 to 180, degrees; default: 4, paper: 10)
+//       number, 0 to 180, degrees; default: 4, paper: 10
 //   view_selection.max_triangulation_angle
 //       Largest triangulation angle of a source view.
-//       (number, 0 to 180, degrees; default: 40, paper: 30)
+//       number, 0 to 180, degrees; default: 40, paper: 30
 //   view_selection.max_sources
 //       Source views of a view, those of smallest triangulation angle; 0 takes all.
-//       (whole number, at least 0, views; default: 12, fast: 8, paper: 0)
+//       whole number, at least 0, views; default: 12, fast: 8, paper: 0
 //   view_selection.max_incident_angle
 //       Largest angle between the normal and the ray to a source view.
-//       (number, 0 to 90, degrees; default: 80)
+//       number, 0 to 90, degrees; default: 80
 //   view_selection.occlusion_tolerance
 //       Relative depth by which a validated surface of a source view must lie in front of a point to occlude
 //       it.
-//       (number, 0 to 1, fraction of the depth; default: 0.01)
+//       number, 0 to 1, fraction of the depth; default: 0.01
 //
 // Check: the geometric consistency check after each cycle.
 //   check.depth_tolerance
 //       Largest relative depth difference of consistent planes.
-//       (number, 0 to 1, fraction of the depth; default: 0.01)
+//       number, 0 to 1, fraction of the depth; default: 0.01
 //   check.normal_tolerance
 //       Largest angle between the normals of consistent planes.
-//       (number, 0 to 180, degrees; default: 30)
+//       number, 0 to 180, degrees; default: 30
 //   check.min_consistent_views
 //       Source views that must be consistent to validate a plane; with 1 and `best_views` a single source
 //       view is enough to match a pixel, as scenes of two views need.
-//       (whole number, at least 1, views; default: 2)
+//       whole number, at least 1, views; default: 2
 //   check.min_consistent_fraction
 //       Fraction of the pixel's view set that must be consistent to validate a plane.
-//       (number, 0 to 1, fraction of the view set; default: 0.5, paper: 0.7)
+//       number, 0 to 1, fraction of the view set; default: 0.5, paper: 0.7
 //   check.ignore_occluders
 //       Leave source views whose own depth is clearly smaller out of that fraction: they may be occluded
 //       there.
-//       (switch, true or false; default: true, paper: false)
+//       switch, true or false; default: true, paper: false
 //
 // Refinement: filters of the planes beyond the paper.
 //   refine.fattening_passes
 //       Passes of the correction of foreground fattening after the last check of each scale; 0 turns it off.
-//       (whole number, 0 to 100, passes; default: 2, paper: 0)
+//       whole number, 0 to 100, passes; default: 2, paper: 0
 //   refine.smoothing_passes
 //       Passes of plane smoothing after each check; 0 turns it off.
-//       (whole number, 0 to 100, passes; default: 1, fast: 2, paper: 0)
+//       whole number, 0 to 100, passes; default: 1, fast: 2, paper: 0
 //   refine.cross_view_averaging
 //       Average validated planes with those of the source views after the last cycle.
-//       (switch, true or false; default: true, paper: false)
+//       switch, true or false; default: true, paper: false
 //   refine.fill_gaps
 //       Fill small gaps from the surrounding planes after the last cycle, where the source views confirm
 //       them.
-//       (switch, true or false; default: true, paper: false)
+//       switch, true or false; default: true, paper: false
 //
 // Fusion: which pixels become points (section 6 of the paper).
 //   fusion.depth_tolerance
 //       Largest relative depth difference of pixels that are fused.
-//       (number, 0 to 1, fraction of the depth; default: 0.01)
+//       number, 0 to 1, fraction of the depth; default: 0.01
 //   fusion.normal_tolerance
 //       Largest angle between the normals of pixels that are fused.
-//       (number, 0 to 180, degrees; default: 30)
+//       number, 0 to 180, degrees; default: 30
 //   fusion.min_views
 //       Other views that must agree with a pixel to make a point.
-//       (whole number, at least 0, views; default: 3, paper: 4)
+//       whole number, at least 0, views; default: 3, paper: 4
 // END OPTIONS
 #ifndef SKEP_OPTIONS_HPP
 #define SKEP_OPTIONS_HPP

@@ -35,7 +35,7 @@ pub struct skep_plane {
     pub distance: f64,
 }
 
-/// Makes the plane with a given normal through the point that a pixel shows at a given depth.
+/// Makes the plane with a given normal through the point of a pixel at a given depth.
 ///
 /// @param camera     The camera.
 /// @param x          Column of the pixel; may be fractional.

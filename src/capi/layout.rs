@@ -43,8 +43,8 @@ macro_rules! layout {
 }
 
 layout! {
-    skep_image { data, width, height, stride_bytes, format }
     skep_camera { fx, fy, cx, cy, rotation, translation }
+    skep_image { data, width, height, stride_bytes, format }
     skep_progress { done, phase, downscale, cycle, view, view_count }
     skep_statistics { ncc_evaluations, bilinear_samples, early_terminations, status_counts }
     skep_cycle_record { downscale, cycle, pixels, changed, validated }

@@ -17,14 +17,15 @@ use std::ffi::c_void;
 /// processed at the same time from several threads, or on several machines: estimates are saved to bytes and
 /// loaded by a stepper of the same scene and options.
 ///
-/// A run is, for cycle 0 and then for the cycle that skep_stepper_next returns, until that is SKEP_CYCLE_NONE:
+/// A run is, for cycle 0 and then for each cycle that skep_stepper_next returns, until SKEP_CYCLE_NONE:
 ///   - for each view, if the cycle is on a finer scale than its estimate: skep_stepper_upsample
-///   - for each view: skep_stepper_propagate and skep_stepper_search, from checked estimates of the last cycle
-///   - for each view: skep_stepper_check, from the searched estimates of this cycle
+///   - for each view: skep_stepper_propagate, then skep_stepper_search, from the checked estimates of the
+///     previous cycle
+///   - for each view: skep_stepper_check, from the searched estimates of the same cycle
 ///
-/// and then, for each view, skep_stepper_finish from the checked estimates of the last cycle, and skep_fuse for
-/// the validated maps of all views. That gives the same bits as skep_reconstruct. What each call performs, and
-/// which estimates of other views it reads:
+/// and then, for each view, skep_stepper_finish from the checked estimates of the last cycle, and skep_fuse
+/// for the validated maps of all views. That gives the same bits as skep_reconstruct. What each call
+/// performs, and which estimates of other views it reads:
 ///
 ///   call       stages                                  estimates of other views
 ///   upsample   upsampling                              none

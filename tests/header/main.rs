@@ -1,5 +1,6 @@
-//! What is generated from the source and committed: `include/skep.h`, and the lists of options in the C++ header and
-//! in the Python package. `SKEP_UPDATE_HEADER=1 cargo test --all-features --test header` writes all of it.
+//! What is generated from the source and committed: `include/skep.h`, and the lists of options in the C++
+//! header and in the Python package. `SKEP_UPDATE_HEADER=1 cargo test --all-features --test header` writes
+//! all of it.
 
 mod manual;
 mod options;
@@ -55,8 +56,8 @@ fn every_function_describes_each_of_its_parameters_in_order() {
     }
 }
 
-/// maturin makes the declarations of the Python package with a cbindgen of its own, from the whole crate; cffi then
-/// reads no directive but numbers.
+/// maturin makes the declarations of the Python package with a cbindgen of its own, from the whole crate;
+/// cffi then reads no directive but numbers.
 #[test]
 fn the_whole_crate_declares_the_same_for_python() {
     let mut config = config();

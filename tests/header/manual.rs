@@ -1,9 +1,9 @@
 //! `include/skep.h` from what cbindgen writes.
 //!
-//! cbindgen writes all constants, then all types, then all functions. Here they are put into sections, one for each file
-//! of the interface, with a title and a list of the sections at the top. Opaque types are declared before all sections:
-//! C wants them before they are named. The first paragraph of their descriptions stays with them; the others open the
-//! section of the file.
+//! cbindgen writes all constants, then all types, then all functions. Here they are put into sections, one
+//! for each file of the interface, with a title and a list of the sections at the top. Opaque types are
+//! declared before all sections: C wants them before they are named. The first paragraph of their
+//! descriptions stays with them; the others open the section of the file.
 
 use super::{config, options, root};
 use std::fmt::Write;

@@ -44,7 +44,7 @@ fn values(info: &OptionInfo) -> String {
 }
 
 /// The values of the presets; the default's alone where the others have the same.
-fn presets(info: &OptionInfo) -> String {
+fn presets(info: &OptionInfo) -> Vec<String> {
     let value = |preset: &str| {
         let options = Options::preset(preset).expect("it is a preset");
         options.get(info.name).expect("it is an option").to_string()
@@ -52,7 +52,7 @@ fn presets(info: &OptionInfo) -> String {
     let all = Options::PRESETS.map(|preset| (preset, value(preset)));
     let others: Vec<_> = all[1..].iter().filter(|(_, value)| *value != all[0].1).collect();
     let listed = all[..1].iter().chain(others.iter().copied());
-    listed.map(|(preset, value)| format!("{preset}: {value}")).collect::<Vec<_>>().join(", ")
+    listed.map(|(preset, value)| format!("{preset}: {value}")).collect()
 }
 
 /// The group of an option, empty where it has none.
@@ -63,22 +63,29 @@ fn group(info: &OptionInfo) -> &'static str {
 /// The list for people, every line behind a mark of comments.
 fn list(mark: &str) -> String {
     let mut out = String::new();
-    for (name, explanation) in std::iter::once(("", "Of the whole run.")).chain(Options::groups()) {
+    for (name, explanation) in std::iter::once(("", "Of the whole run:")).chain(Options::groups()) {
         out += &format!("{mark}\n{}", wrap(explanation, &format!("{mark} "), &format!("{mark} ")));
         for info in Options::infos().filter(|info| group(info) == name) {
             let indented = format!("{mark}       ");
             writeln!(out, "{mark}   {}", info.name).unwrap();
             out += &wrap(info.explanation, &indented, &indented);
-            out += &wrap(&format!("({}; {})", values(&info), presets(&info)), &indented, &indented);
+            // The texts of schedules have lines of their own, to be copied from there.
+            match info.kind {
+                Kind::Text => presets(&info).iter().for_each(|line| out += &wrap(line, &indented, &indented)),
+                _ => {
+                    let line = format!("{}; {}", values(&info), presets(&info).join(", "));
+                    out += &wrap(&line, &indented, &indented);
+                }
+            }
         }
     }
     out
 }
 
 pub fn in_c() -> String {
-    let introduction = "Options have a name with a group, which may be left out where no other group has an option of \
-                        that name. In parentheses: the accepted values with their unit, and the value of the default \
-                        preset and of other presets where they differ.";
+    let introduction = "Options have a name with a group, which may be left out where no other group has an option \
+                        of that name. Below each name: what it does; the accepted values with their unit; the value \
+                        of the default preset, and those of other presets where they differ.";
     format!("/*\n{}{} */\n\n", wrap(introduction, " * ", " * "), list(" *"))
 }
 
@@ -97,7 +104,7 @@ pub fn in_python(root: &Path) -> String {
             Kind::Text => "str",
         };
         writeln!(out, "    {}: {kind}", info.name.replace('.', "_")).unwrap();
-        let text = format!("{} ({}; {})", info.explanation, values(&info), presets(&info));
+        let text = format!("{} ({}; {})", info.explanation, values(&info), presets(&info).join(", "));
         // The quotes belong to the last word, so that they are on its line.
         out += &wrap(&format!("{text}\"\"\""), "    \"\"\"", "    ");
     }

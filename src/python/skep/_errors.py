@@ -1,4 +1,6 @@
-"""Failures as exceptions. Their texts are the library's: the argument, its value, and what would have been right."""
+"""Failures as exceptions. Their texts are the library's: the argument, its value, and what would have been
+right.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ class Error(Exception):
 
 
 class ArgumentError(Error, ValueError):
-    """A value cannot be used: out of range, not a number, of the wrong size, unknown, or in the wrong order."""
+    """A value cannot be used: out of range, not finite, of the wrong size, unknown, or in the wrong order."""
 
     status = lib.SKEP_ERR_ARGUMENT
 

@@ -37,13 +37,13 @@ _BY_ANY_NAME = _by_any_name()
 
 
 class Options(Mapping[str, Value]):
-    """Options by name, as items or attributes: `options["check.depth_tolerance"]` is `options.check_depth_tolerance`.
+    """Options by name, as items or attributes.
 
-    Where no other group has an option of that name, the group may be left out: `options["threads"]`,
-    `options.window_radius`. Values are checked when they are set.
+    `options["check.depth_tolerance"]` is `options.check_depth_tolerance`. The group may be left out where no
+    other group has an option of that name: `options.window_radius`. Values are checked when they are set.
 
-    Starts from a preset: "default" is the most accurate, "fast" takes less than half of its time, "paper" follows the
-    paper literally. `Options("fast", threads=2, fusion_min_views=2)` sets some at once.
+    Starts from a preset: "default" is the most accurate, "fast" takes less than half of its time, "paper"
+    follows the paper literally. `Options("fast", threads=2, fusion_min_views=2)` sets some at once.
     """
 
     __slots__ = ("_handle",)
@@ -245,10 +245,8 @@ def _switch(value: str) -> bool:
     return value == "true"
 
 
-_TYPES = {
-    name: {"int": int, "float": float, "bool": _switch, "str": str}[Options.__annotations__[name.replace(".", "_")]]
-    for name in _NAMES
-}
+_FROM_TEXT = {"int": int, "float": float, "bool": _switch, "str": str}
+_TYPES = {name: _FROM_TEXT[Options.__annotations__[name.replace(".", "_")]] for name in _NAMES}
 
 
 def handle(options: Options | None) -> Any:

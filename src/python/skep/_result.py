@@ -75,8 +75,8 @@ class CycleRecord:
 class ResultView:
     """The maps of one view.
 
-    Raw maps are read-only arrays of the result's own memory, which lives as long as they do; the others are copies,
-    made at the first access.
+    Raw maps are read-only arrays of the result's own memory, which lives as long as they do; the others are
+    copies, made at the first access.
     """
 
     def __init__(self, handle: Any, view: int) -> None:
@@ -108,7 +108,9 @@ class ResultView:
 
     @cached_property
     def normal(self) -> NDArray[np.float32]:
-        """Raw unit normals in the view's camera frame, facing the camera, zeros where none; (height, width, 3)."""
+        """Raw unit normals in the view's camera frame, facing the camera, zeros where none; (height, width,
+        3).
+        """
         return self._borrow(lib.skep_result_borrow_normal, "float", np.float32, 3)
 
     @cached_property
@@ -165,11 +167,13 @@ class ResultView:
         check(lib.skep_result_get_cycles(self._handle, self.view, ffi.NULL, 0, count))
         found = ffi.new("skep_cycle_record[]", count[0])
         check(lib.skep_result_get_cycles(self._handle, self.view, found, count[0], count))
-        return tuple(CycleRecord(one.downscale, one.cycle, one.pixels, one.changed, one.validated) for one in found)
+        return tuple(
+            CycleRecord(one.downscale, one.cycle, one.pixels, one.changed, one.validated) for one in found
+        )
 
 
 class Result:
-    """Result of a whole run: `result[view]` holds the maps of a view; `len(result)` is the number of views."""
+    """Result of a whole run: `result[view]` holds the maps of a view, `len(result)` counts the views."""
 
     def __init__(self, handle: Any) -> None:
         self._handle = handle
@@ -206,7 +210,9 @@ class Result:
         return tuple(_until_refused(warning))
 
     def write_workspace(self, scene: Scene, folder: str | os.PathLike[str]) -> None:
-        """Writes what COLMAP calls a dense folder, less images/ and sparse/, which `Scene.write_colmap` writes."""
+        """Writes what COLMAP calls a dense folder, less images/ and sparse/, which `Scene.write_colmap`
+        writes.
+        """
         check(lib.skep_result_write_workspace(self._handle, scene._handle, path(folder, "folder")))
 
 
@@ -219,11 +225,13 @@ def _until_refused(item: Callable[[int], T]) -> Iterator[T]:
             return
 
 
-def reconstruct(scene: Scene, options: Options | None = None, progress: ProgressFunction | None = None) -> Result:
+def reconstruct(
+    scene: Scene, options: Options | None = None, progress: ProgressFunction | None = None
+) -> Result:
     """Estimates depth, normal and source views of every pixel of every view, and fuses the validated pixels.
 
-    `progress` is called in this thread; a true answer cancels the run, which raises `Cancelled`. An exception, as is
-    KeyboardInterrupt, cancels it too.
+    `progress` is called in this thread; a true answer cancels the run, which raises `Cancelled`. An
+    exception, as is KeyboardInterrupt, cancels it too.
     """
     chosen = _options.handle(options)
     call = lambda *hook: lib.skep_reconstruct(scene._handle, chosen, *hook)

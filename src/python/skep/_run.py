@@ -1,8 +1,9 @@
 """Long calls: progress and cancellation.
 
-The library calls back from threads of its own, where Python handles no signals, and while the calling thread waits in
-C it handles none either. So the call is made in a thread of its own, and the calling thread waits in Python: there it
-calls the progress function, and a signal's handler can raise, as KeyboardInterrupt does, which stops the call.
+The library calls back from threads of its own, where Python handles no signals, and while the calling thread
+waits in C it handles none either. So the call is made in a thread of its own, and the calling thread waits in
+Python: there it calls the progress function, and a signal's handler can raise, as KeyboardInterrupt does,
+which stops the call.
 """
 
 from __future__ import annotations
@@ -42,8 +43,8 @@ class Progress:
 
 
 ProgressFunction = Callable[[Progress], object]
-"""Called in the thread that made the call, whenever there is news and it is idle. What is true cancels the call, which
-then raises `Cancelled`; an exception cancels it too, and is raised from it."""
+"""Called in the thread that made the call, whenever there is news and it is idle. What is true cancels the
+call, which then raises `Cancelled`; an exception cancels it too, and is raised from it."""
 
 
 class _Call:
@@ -99,8 +100,8 @@ class _Call:
 
 
 def run(call: Callable[[Any, Any, Any], int], kind: str, progress: ProgressFunction | None) -> Any:
-    """Makes `call(progress_function, user, out)` and waits until it has ended; gives the object of this kind that it
-    created, or raises its error.
+    """Makes `call(progress_function, user, out)` and waits until it has ended; gives the object of this kind
+    that it created, or raises its error.
     """
     under_way = _Call(call, kind)
     try:

@@ -34,7 +34,9 @@ class Scene:
         self._handle = ffi.gc(out[0], lib.skep_scene_destroy)
 
     @classmethod
-    def read_colmap(cls, folder: str | os.PathLike[str], depth_range: tuple[float, float] | None = None) -> Scene:
+    def read_colmap(
+        cls, folder: str | os.PathLike[str], depth_range: tuple[float, float] | None = None
+    ) -> Scene:
         """Reads a folder with images/ and a COLMAP model in sparse/ or sparse/0/.
 
         `depth_range` is that of every view; None derives it from the sparse points.
@@ -62,8 +64,8 @@ class Scene:
     ) -> int:
         """Adds a photograph, which is copied, and returns its number.
 
-        `image` has shape (height, width) or (height, width, 1, 3 or 4) and type uint8, uint16, or float32 from 0 to 1;
-        `order` is that of its channels. Rows may lie apart, as in a part of a larger image.
+        `image` has shape (height, width) or (height, width, 1, 3 or 4) and type uint8, uint16, or float32
+        from 0 to 1; `order` is that of its channels. Rows may lie apart, as in a part of a larger image.
         """
         given = to_image(image, order)
         # A view that was added stays: what could be refused later is tried before.
@@ -94,7 +96,7 @@ class Scene:
         check(lib.skep_scene_set_mask(self._handle, view, given.pointer, given.stride))
 
     def set_depth_range(self, view: int, depth_range: tuple[float, float] | None) -> None:
-        """Sets the depth range of a view, near and far; None derives it from the sparse points, the default."""
+        """Sets the depth range of a view; None derives it from the sparse points, which is the default."""
         near, far = depth_range or (0.0, 0.0)
         check(lib.skep_scene_set_depth_range(self._handle, index(view, "view"), near, far))
 
@@ -114,7 +116,9 @@ class Scene:
         points = doubles(positions, (-1, 3), "positions")
         lists = [indices(seen, "views") for seen in views]
         if len(lists) != len(points):
-            raise ArgumentError(f"views are {len(lists)} lists: must be one for each of the {len(points)} points")
+            raise ArgumentError(
+                f"views are {len(lists)} lists: must be one for each of the {len(points)} points"
+            )
         counts = np.array([seen.size for seen in lists], dtype=np.uint32)
         flat = np.concatenate(lists) if lists else np.zeros(0, dtype=np.uint32)
         check(
@@ -166,7 +170,9 @@ class Scene:
         return take_indices(lambda *out: lib.skep_scene_get_sources(self._handle, chosen, view, *out))
 
     def overlap(self, view: int) -> tuple[int, ...]:
-        """The views that fusion compares with a view: those that share a sparse point with it, else all others."""
+        """The views that fusion compares with a view: those that share a sparse point with it, else all
+        others.
+        """
         index(view, "view")
         return take_indices(lambda *out: lib.skep_scene_get_overlap(self._handle, view, *out))
 

@@ -76,7 +76,9 @@ class Estimate:
 
     @staticmethod
     def load(stepper: Stepper, saved: bytes) -> Estimate:
-        """Loads an estimate that the same version of the library saved, for a stepper of the same scene and options."""
+        """Loads an estimate that the same version of the library saved, for a stepper of the same scene and
+        options.
+        """
         given = ffi.from_buffer("uint8_t[]", saved)
         return stepper._take(lambda out: lib.skep_estimate_load(stepper._handle, given, len(given), out))
 
@@ -90,11 +92,12 @@ class Estimate:
         validated: ArrayLike | None = None,
         cost: ArrayLike | None = None,
     ) -> Estimate:
-        """Makes a checked estimate of `cycle` from the caller's own maps, which have the size `Stepper.size` returns.
+        """Makes a checked estimate of `cycle` from the caller's own maps, which have the size `Stepper.size`
+        returns.
 
-        `depth` in world units, 0 where there is none; `normal` (height, width, 3), unit, in the camera frame, facing
-        the camera. `validated` is true where the plane counts as validated; None validates every depth. `cost`
-        ranks the planes in the propagation to other views; None is 0.
+        `depth` in world units, 0 where there is none; `normal` (height, width, 3), unit, in the camera frame,
+        facing the camera. `validated` is true where the plane counts as validated; None validates every
+        depth. `cost` ranks the planes in the propagation to other views; None is 0.
         """
         width, height = stepper.size(cycle, view)
         shape = (height, width)
@@ -106,7 +109,9 @@ class Estimate:
             None if cost is None else rows(cost, np.float32, shape, "cost"),
         ]
         flat = [part for given in maps for part in ((ffi.NULL, 0) if given is None else given[:2])]
-        return stepper._take(lambda out: lib.skep_estimate_from_maps(stepper._handle, cycle, view, *flat, out))
+        return stepper._take(
+            lambda out: lib.skep_estimate_from_maps(stepper._handle, cycle, view, *flat, out)
+        )
 
     def save(self) -> bytes:
         """The estimate as bytes, to keep it or to send it to another machine."""
@@ -158,9 +163,9 @@ class Stepper:
     - `propagate` and `search` each view, from the checked estimates of the previous cycle;
     - `check` each view against the searched estimates of the same cycle.
 
-    After the last cycle, `finish` each view and `fuse` the validated maps. That gives the same bits as `reconstruct`.
-    Different views may be processed at the same time from several threads. Lists of estimates have one entry for each
-    view of the scene, None where there is no estimate; an empty list has none.
+    After the last cycle, `finish` each view and `fuse` the validated maps. That gives the same bits as
+    `reconstruct`. Different views may be processed at the same time from several threads. Lists of estimates
+    have one entry for each view of the scene, None where there is no estimate; an empty list has none.
     """
 
     __slots__ = ("_handle", "view_count", "_cycles")
@@ -208,8 +213,8 @@ class Stepper:
         return take_indices(lambda *out: lib.skep_stepper_get_sources(self._handle, view, *out))
 
     def propagate(self, cycle: int, view: int, estimates: Sequence[Estimate | None]) -> Candidates:
-        """Transfers consistent planes of the views whose source lists contain the view to its pixels without a validated
-        plane; from the checked estimates of the previous cycle."""
+        """Transfers consistent planes of the views whose source lists contain the view to its pixels without
+        a validated plane; from the checked estimates of the previous cycle."""
         out = ffi.new("skep_candidates **")
         numbers = index(cycle, "cycle"), index(view, "view")
         check(lib.skep_stepper_propagate(self._handle, *numbers, *_array(estimates), out))
@@ -223,10 +228,11 @@ class Stepper:
         candidates: Candidates | None = None,
         progress: ProgressFunction | None = None,
     ) -> Estimate:
-        """Searches the planes of a view for one cycle and fills textureless regions; the result is to be checked.
+        """Searches the planes of a view for one cycle and fills textureless regions; the result is to be
+        checked.
 
-        From checked estimates of the previous cycle, on the scale of this one: reads the view's own and the validated
-        surfaces of its sources. `progress` as in `reconstruct`.
+        From checked estimates of the previous cycle, on the scale of this one: reads the view's own and the
+        validated surfaces of its sources. `progress` as in `reconstruct`.
         """
         known = tuple(estimates)
         planes = ffi.NULL if candidates is None else candidates._handle
@@ -238,16 +244,20 @@ class Stepper:
     def check(self, cycle: int, view: int, estimates: Sequence[Estimate | None]) -> Estimate:
         """Checks a view against the searched estimates of its sources, of the same cycle.
 
-        Changes depths and normals too: after the consistency check it corrects foreground fattening (where the scale
-        may end with this cycle), smooths planes, and publishes the validated surface.
+        Changes depths and normals too: after the consistency check it corrects foreground fattening (where
+        the scale may end with this cycle), smooths planes, and publishes the validated surface.
         """
         numbers = index(cycle, "cycle"), index(view, "view")
         return self._take(lambda out: lib.skep_stepper_check(self._handle, *numbers, *_array(estimates), out))
 
     def upsample(self, cycle: int, view: int, estimate: Estimate) -> Estimate:
-        """A checked estimate on the next finer scale, that of `cycle`: each pixel gets the plane of its coarse pixel."""
+        """A checked estimate on the next finer scale, that of `cycle`: each pixel gets the plane of its
+        coarse pixel.
+        """
         numbers = index(cycle, "cycle"), index(view, "view")
-        return self._take(lambda out: lib.skep_stepper_upsample(self._handle, *numbers, estimate._handle, out))
+        return self._take(
+            lambda out: lib.skep_stepper_upsample(self._handle, *numbers, estimate._handle, out)
+        )
 
     def next(self, cycle: int, estimates: Sequence[Estimate | None]) -> int | None:
         """The cycle after `cycle`, from its checked estimates; None after the last.
@@ -261,7 +271,8 @@ class Stepper:
     def finish(
         self, view: int, estimates: Sequence[Estimate | None], progress: ProgressFunction | None = None
     ) -> ResultView:
-        """Averages planes across views, fills small gaps, and determines view set, cost and status of every pixel.
+        """Averages planes across views, fills small gaps, and determines view set, cost and status of every
+        pixel.
 
         From the checked estimates of the last cycle.
         """
