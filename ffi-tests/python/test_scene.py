@@ -43,7 +43,7 @@ def test_masked_pixels_have_no_depth_and_say_why():
     mask = np.ones((made.HEIGHT, made.WIDTH + 3), dtype=bool)[:, 3:]
     mask[:30, 10:40] = False
     scene.set_mask(0, mask)
-    options = skep.Options(scales=[(0, 3, 1, 1, 1)])
+    options = skep.Options(scales="downscale=1 food_sources=3 iterations=1+1x1")
     masked = skep.reconstruct(scene, options)[0]
     assert np.array_equal(masked.status == skep.PixelStatus.MASKED, ~mask)
     assert not masked.depth[~mask].any() and masked.depth[mask].all()

@@ -1,5 +1,9 @@
 // Options. Part of skep.hpp.
 //
+// Names have a group, which may be left out where no other group has an option of that name. Below each
+// name: what it does; the accepted values with their unit; the value of the default preset, and those of
+// other presets where they differ.
+//
 // BEGIN OPTIONS
 //
 // Of the whole run:

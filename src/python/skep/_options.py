@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -245,7 +245,7 @@ def _switch(value: str) -> bool:
     return value == "true"
 
 
-_FROM_TEXT = {"int": int, "float": float, "bool": _switch, "str": str}
+_FROM_TEXT: dict[str, Callable[[str], Value]] = {"int": int, "float": float, "bool": _switch, "str": str}
 _TYPES = {name: _FROM_TEXT[Options.__annotations__[name.replace(".", "_")]] for name in _NAMES}
 
 
