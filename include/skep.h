@@ -1325,7 +1325,7 @@ typedef struct skep_fusion_view {
  * @param cloud_out         Receives the cloud; destroy it with skep_cloud_destroy. Not written when the call
  *                          fails.
  * @retval SKEP_ERR_ARGUMENT   A camera, size, stride, image or overlap that cannot be used, named like
- *                             "views[2].depth"; options out of range.
+ *                             `views[2].depth`; options out of range.
  * @retval SKEP_ERR_CANCELLED  The callback returned non-zero.
  */
 skep_status skep_fuse(const struct skep_fusion_view *views,
@@ -1591,8 +1591,8 @@ skep_status skep_stepper_upsample(const struct skep_stepper *stepper,
                                   struct skep_estimate **estimate_out);
 
 /**
- * Gets the cycle that follows a cycle. A scale ends early when fewer pixels of all given estimates changed
- * than option "schedule.min_changed_fraction" demands.
+ * Gets the cycle that follows a cycle. A scale ends early when the fraction of changed pixels in all given
+ * estimates is below option "schedule.min_changed_fraction".
  *
  * Reads the numbers of changed pixels only.
  *

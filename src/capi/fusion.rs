@@ -99,7 +99,7 @@ impl skep_fusion_view {
 /// @param cloud_out         Receives the cloud; destroy it with skep_cloud_destroy. Not written when the call
 ///                          fails.
 /// @retval SKEP_ERR_ARGUMENT   A camera, size, stride, image or overlap that cannot be used, named like
-///                             "views[2].depth"; options out of range.
+///                             `views[2].depth`; options out of range.
 /// @retval SKEP_ERR_CANCELLED  The callback returned non-zero.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_fuse(

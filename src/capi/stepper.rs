@@ -441,8 +441,8 @@ pub unsafe extern "C" fn skep_stepper_upsample(
     })
 }
 
-/// Gets the cycle that follows a cycle. A scale ends early when fewer pixels of all given estimates changed
-/// than option "schedule.min_changed_fraction" demands.
+/// Gets the cycle that follows a cycle. A scale ends early when the fraction of changed pixels in all given
+/// estimates is below option "schedule.min_changed_fraction".
 ///
 /// Reads the numbers of changed pixels only.
 ///
