@@ -42,10 +42,8 @@ pub struct Item {
 impl Item {
     fn parse(text: &str) -> Item {
         let (comment, code) = text.split_once("\n */\n").expect("everything public is described");
-        let bare = |line: &str| line.strip_prefix(" *").unwrap_or(line).trim_start_matches(' ').len();
         let line = |line: &str| {
             let text = line.strip_prefix(" *").expect("lines of a description are marked");
-            debug_assert!(bare(line) <= text.len());
             text.strip_prefix(' ').unwrap_or(text).to_string()
         };
         Item { comment: comment.lines().map(line).collect(), code: code.trim_end().to_string() }
@@ -62,8 +60,8 @@ impl Item {
     pub fn name(&self) -> &str {
         let is_mark = |character: char| !(character.is_alphanumeric() || character == '_');
         let mut words = self.code.split(is_mark).filter(|word| word.to_lowercase().starts_with("skep_"));
-        let is_typedef_of_number = self.code.starts_with("typedef int32_t");
-        let own = words.find(|word| is_typedef_of_number || *word != "skep_status" || !self.is_function());
+        // Most functions return a status, whose name comes before theirs.
+        let own = words.find(|word| *word != "skep_status" || !self.is_function());
         own.expect("everything public has the prefix")
     }
 
