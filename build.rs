@@ -1,5 +1,4 @@
-//! Gives the shared library the name that programs linked with it ask for at run time, and `cargo cinstall` the one
-//! file to install that the version is written in.
+//! Sets the SONAME of the shared library, and writes the file with the version that `cargo cinstall` installs.
 
 use std::path::Path;
 

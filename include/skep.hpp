@@ -16,9 +16,9 @@
 //
 // What skep.h says of each function holds here; this file only says what is different.
 //
-// Objects (Options, Scene, Result, Cloud, Stepper, Estimate, Candidates, Samples, Window) own what they
-// stand for, can be moved and not copied, and get() is the C object, for calls that are not
-// wrapped. Using an object that was moved from is an error, not a crash.
+// Objects (Options, Scene, Result, Cloud, Stepper, Estimate, Candidates, PackedImage, NccWindow)
+// own what they stand for, can be moved and not copied, and get() is the C object, for calls that
+// are not wrapped. Using an object that was moved from is an error, not a crash.
 //
 // Errors are exceptions of type skep::Error. With SKEP_NO_EXCEPTIONS defined, or exceptions turned
 // off in the compiler, every function whose type below is Fallible<T> returns a skep::Expected<T>
@@ -47,22 +47,24 @@
 #include "skep/files.hpp"
 #include "skep/kernels.hpp"
 #include "skep/object.hpp"
+#include "skep/options.hpp"
 #include "skep/result.hpp"
 #include "skep/scene.hpp"
 #include "skep/shapes.hpp"
 #include "skep/stepper.hpp"
 
 namespace skep {
-inline namespace SKEP_FLAVOUR {
+inline namespace SKEP_FLAVOR {
 
 /// The library's version, such as "0.1.0".
 inline const char *version() noexcept { return skep_version(); }
-/// The instruction set runs are made on: "scalar", "base" or "v3".
-inline const char *backend_name() noexcept { return skep_simd_level_name(); }
+/// The instruction set that a run uses unless option "simd" says otherwise: "scalar", "baseline" or
+/// "v3".
+inline const char *simd_level_name() noexcept { return skep_simd_level_name(); }
 /// Whether the library is the one this header was made for.
 inline bool abi_matches() noexcept { return skep_abi_version() == SKEP_ABI_VERSION; }
 
-} // namespace SKEP_FLAVOUR
+} // namespace SKEP_FLAVOR
 } // namespace skep
 
 #endif // SKEP_HPP

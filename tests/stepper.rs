@@ -185,7 +185,10 @@ fn what_does_not_belong_together_is_refused_by_name() {
     assert!(search(9, 0, &[]).starts_with("cycle is 9"), "{}", search(9, 0, &[]));
     assert!(search(0, 4, &[]).starts_with("view is 4"));
     assert!(search(1, 0, &known(&first)[..2]).starts_with("estimates is 2 entries"));
-    assert!(search(1, 0, &[Some(&first[1]), None, None, None]).starts_with("estimates[0] is that of view 1"));
+    assert!(
+        search(1, 0, &[Some(&first[1]), None, None, None])
+            .starts_with("estimates[0] is the estimate of view 1")
+    );
     assert!(search(3, 0, &known(&first)).contains("upsampled"));
     assert!(message(stepper.upsample(1, &first[0]).unwrap_err()).contains("the scale before"));
     assert!(
@@ -195,7 +198,8 @@ fn what_does_not_belong_together_is_refused_by_name() {
     let check = |sources: &[Option<EstimateRef>]| message(stepper.check(&searched, sources).unwrap_err());
     assert!(check(&[None]).starts_with("estimates is 1 entries"));
     assert!(
-        check(&[None, Some((&first[0]).into()), None, None]).starts_with("estimates[1] is that of view 0")
+        check(&[None, Some((&first[0]).into()), None, None])
+            .starts_with("estimates[1] is the estimate of view 0")
     );
     let fine = stepper.upsample(3, &first[1]).unwrap();
     assert!(check(&[None, Some((&fine).into()), None, None]).contains("on the scale of cycle 1"));

@@ -27,20 +27,27 @@ pictures.mkdir(parents=True, exist_ok=True)
 scene = skep.Scene.read_colmap(folder)
 for view in range(len(scene)):
     near, far = scene.depth_range(view)
-    print(f"{scene.name(view)}: {scene.size(view)}, depth {near:.2f} to {far:.2f}, sources {scene.sources(view)}")
+    print(
+        f"{scene.name(view)}: {scene.size(view)}, depth {near:.2f} to {far:.2f}, "
+        f"sources {scene.sources(view)}"
+    )
 
 # %% The run; Ctrl-C stops it
 options = skep.Options()
 if quick:
-    options.scales = [(2, 4, 6, 3, 1), (1, 3, 2, 1, 1), (0, 2, 0, 1, 1)]
-    options.max_sources = options.focused_views = options.best_views = 3
+    options.schedule_scales = (
+        "downscale=4 food_sources=4 iterations=6+3x1; "
+        "downscale=2 food_sources=3 iterations=2+1x1; "
+        "downscale=1 food_sources=2 iterations=0+1x1"
+    )
+    options.view_selection_max_sources = options.cost_max_views_per_pixel = options.cost_best_views = 3
 
 
-def show(progress: skep.Progress) -> None:
+def print_progress(progress: skep.Progress) -> None:
     print(f"\r{progress.done:4.0%}", end="", flush=True)
 
 
-result = skep.reconstruct(scene, options, show)
+result = skep.reconstruct(scene, options, print_progress)
 print(f"\r{len(result.cloud)} points", *result.warnings, sep="\n")
 
 # %% The maps of a view: raw ones are the library's own memory, validated ones are copies

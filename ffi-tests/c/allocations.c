@@ -60,7 +60,8 @@ int main(void) {
 
     long before = atomic_load(&allocations);
     skep_ncc_window *window = make_window();
-    skep_packed_image *reference = make_samples(&made, 0), *source = make_samples(&made, 1);
+    skep_packed_image *reference = make_packed_image(&made, 0),
+                      *source = make_packed_image(&made, 1);
     const long made_with = atomic_load(&allocations) - before;
     CHECK(made_with >= 3, "allocations of the library are counted, but there were %ld", made_with);
 

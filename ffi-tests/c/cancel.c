@@ -86,7 +86,7 @@ static void check_runs(const scene *made, const skep_scene *handed_in,
 }
 
 static void check_stepper(const scene *made, const skep_scene *handed_in,
-                        const skep_options *options) {
+                          const skep_options *options) {
     skep_stepper *stepper = NULL;
     REQUIRE(skep_stepper_create(handed_in, options, &stepper));
     host self = {.stop_at = 0};
@@ -97,16 +97,16 @@ static void check_stepper(const scene *made, const skep_scene *handed_in,
     skep_estimate *estimates[MAX_VIEWS] = {NULL}, *searched = NULL;
     REQUIRE(skep_stepper_search(stepper, 2, 0, NULL, 0, NULL, callback, &self, &searched));
     estimates[0] = searched;
-    REQUIRE(
-        skep_stepper_check(stepper, 2, 0, (const skep_estimate *const *)estimates, made->views, &estimates[0]));
+    REQUIRE(skep_stepper_check(stepper, 2, 0, (const skep_estimate *const *)estimates, made->views,
+                               &estimates[0]));
     skep_estimate_destroy(searched);
     self = (host){.stop_at = 0};
-    status = skep_stepper_finish(stepper, 0, (const skep_estimate *const *)estimates, made->views, callback,
-                               &self, OUT(skep_result *, 0));
+    status = skep_stepper_finish(stepper, 0, (const skep_estimate *const *)estimates, made->views,
+                                 callback, &self, OUT(skep_result *, 0));
     check_stopped(&self, status, "skep_stepper_finish");
     skep_result *result = NULL;
-    REQUIRE(skep_stepper_finish(stepper, 0, (const skep_estimate *const *)estimates, made->views, NULL, NULL,
-                              &result));
+    REQUIRE(skep_stepper_finish(stepper, 0, (const skep_estimate *const *)estimates, made->views,
+                                NULL, NULL, &result));
     skep_result_destroy(result);
     skep_estimate_destroy(estimates[0]);
     skep_stepper_destroy(stepper);

@@ -111,7 +111,8 @@ static void check_range(const scene *made, skep_scene *handed_in, const skep_opt
     for (size_t i = 0; i < scene_pixels(made); ++i) {
         CHECK(maps.depth[0][i] >= 2 && maps.depth[0][i] <= 2.5f, "%g", maps.depth[0][i]);
     }
-    CHECK(maps.statistics.status_counts[SKEP_PIXEL_VALIDATED] * 10 < scene_pixels(made), "%llu validated",
+    CHECK(maps.statistics.status_counts[SKEP_PIXEL_VALIDATED] * 10 < scene_pixels(made),
+          "%llu validated",
           (unsigned long long)maps.statistics.status_counts[SKEP_PIXEL_VALIDATED]);
     maps_free(&maps);
     skep_result_destroy(result);
@@ -148,24 +149,29 @@ static void check_options(void) {
     REQUIRE(skep_options_create("paper", &paper));
     size_t count = 0, different = 0;
     for (const char *name; (name = skep_option_name(count)) != NULL; ++count) {
-        double value = -1, of_paper = -1, after = -1;
-        REQUIRE(skep_options_get(options, name, &value));
-        REQUIRE(skep_options_get(paper, name, &of_paper));
-        different += value != of_paper;
-        REQUIRE(skep_options_set(options, name, of_paper));
-        REQUIRE(skep_options_get(options, name, &after));
-        CHECK(after == of_paper, "%s is %g, not %g", name, after, of_paper);
+        char value[256], of_paper[256], after[256];
+        size_t needed = 0;
+        REQUIRE(skep_options_get_text(options, name, value, sizeof value, NULL));
+        REQUIRE(skep_options_get_text(paper, name, of_paper, sizeof of_paper, &needed));
+        CHECK(needed == strlen(of_paper) + 1, "%s", name);
+        different += strcmp(value, of_paper) != 0;
+        REQUIRE(skep_options_set_text(options, name, of_paper));
+        REQUIRE(skep_options_get_text(options, name, after, sizeof after, NULL));
+        CHECK(strcmp(after, of_paper) == 0, "%s is %s, not %s", name, after, of_paper);
     }
     CHECK(count > 20 && different > 5, "%zu options, %zu different", count, different);
     CHECK(skep_option_name(SIZE_MAX) == NULL, "no such option");
-    skep_scale scales[4];
-    size_t scale_count = 0;
-    REQUIRE(skep_options_get_scales(paper, NULL, 0, &scale_count));
-    CHECK(scale_count == 1, "%zu scales", scale_count);
-    const skep_scale wanted[] = {{2, 5, 3, 1, 2}, {1, 4, 2, 2, 1}, {0, 3, 1, 0, 0}};
-    REQUIRE(skep_options_set_scales(paper, wanted, 3));
-    REQUIRE(skep_options_get_scales(paper, scales, 4, &scale_count));
-    CHECK(scale_count == 3 && same_bytes(scales, wanted, sizeof wanted), "%zu scales", scale_count);
+    /* As numbers, under their names with and without the group. */
+    double value = -1;
+    REQUIRE(skep_options_set(options, "check.depth_tolerance", 0.25));
+    REQUIRE(skep_options_get(options, "check.depth_tolerance", &value));
+    CHECK(value == 0.25, "%g", value);
+    REQUIRE(skep_options_set(options, "view_propagation", 0));
+    REQUIRE(skep_options_get(options, "search.view_propagation", &value));
+    CHECK(value == 0, "%g", value);
+    REQUIRE(skep_options_set_text(options, "view_propagation", "true"));
+    REQUIRE(skep_options_get(options, "view_propagation", &value));
+    CHECK(value == 1, "%g", value);
     skep_options_destroy(paper);
     skep_options_destroy(options);
 }
@@ -174,17 +180,17 @@ static void check_options(void) {
 static void check_seed_and_simd(const scene *made, const skep_scene *handed_in,
                                 skep_options *options) {
     skep_result *first = scene_run(handed_in, options);
-    static const char *const LEVELS[] = {"scalar", "base", "v3"};
+    static const char *const LEVELS[] = {"scalar", "baseline", "v3"};
     for (size_t i = 0; i < (scene_is_small() ? 1 : 3); ++i) {
-        REQUIRE(skep_options_set_simd(options, LEVELS[i]));
+        REQUIRE(skep_options_set_text(options, "simd", LEVELS[i]));
         skep_result *same = scene_run(handed_in, options);
         check_same_results(first, same, made->views, LEVELS[i]);
         skep_result_destroy(same);
     }
-    REQUIRE(skep_options_set_simd(options, NULL));
-    REQUIRE(skep_options_set_seed(options, 7));
-    uint64_t seed = 0;
-    REQUIRE(skep_options_get_seed(options, &seed));
+    REQUIRE(skep_options_set_text(options, "simd", "best"));
+    REQUIRE(skep_options_set(options, "seed", 7));
+    double seed = 0;
+    REQUIRE(skep_options_get(options, "seed", &seed));
     CHECK(seed == 7, "the seed is read back");
     skep_result *other = scene_run(handed_in, options);
     view_maps a = maps_of(first, 0), b = maps_of(other, 0);
@@ -214,7 +220,8 @@ static void check_extremes(const skep_options *options) {
         REQUIRE(skep_scene_validate(tiny));
         skep_result *result = scene_run(tiny, options);
         view_maps maps = maps_of(result, 0);
-        CHECK(maps.statistics.status_counts[SKEP_PIXEL_VALIDATED] == 0, "%u pixels", (unsigned)width);
+        CHECK(maps.statistics.status_counts[SKEP_PIXEL_VALIDATED] == 0, "%u pixels",
+              (unsigned)width);
         CHECK(maps.status[0] == SKEP_PIXEL_NO_SOURCES, "%u", maps.status[0]);
         maps_free(&maps);
         char warning[256] = "";

@@ -146,8 +146,8 @@ void test_kernels(const char *folder) {
     batch *work = take(1, sizeof *work);
     work->made = &made;
     work->window = make_window();
-    work->reference = make_samples(&made, 0);
-    work->source = make_samples(&made, 1);
+    work->reference = make_packed_image(&made, 0);
+    work->source = make_packed_image(&made, 1);
     work->count = make_patches(&made, 0, MOST, work->planes, work->pixels);
     REQUIRE(skep_plane_homographies(&made.photographs[0].camera, &made.photographs[1].camera,
                                     work->planes, work->count, work->homographies));

@@ -1,4 +1,5 @@
-/* Maps that make no estimate, and saved estimates that were cut or garbled: refused, or harmless. */
+/* Maps that make no estimate, and saved estimates that were cut or garbled: refused, or harmless.
+ */
 #include "support/check.h"
 #include "support/guarded.h"
 #include "support/scene.h"
@@ -18,8 +19,8 @@ static void check_maps(const scene *made, const skep_stepper *stepper, uint32_t 
     memcpy(depth, truth->depth, pixels * sizeof *depth);
     memcpy(normal, truth->normal, pixels * 3 * sizeof *normal);
     skep_estimate **out = OUT(skep_estimate *, 0);
-#define FROM(stepper, step, view, depth, a, normal, b, validated, c, cost, d, out)                   \
-    skep_estimate_from_maps(stepper, step, view, depth, a, normal, b, validated, c, cost, d, out)
+#define FROM(stepper, cycle, view, depth, a, normal, b, validated, c, cost, d, out)                \
+    skep_estimate_from_maps(stepper, cycle, view, depth, a, normal, b, validated, c, cost, d, out)
     const size_t w = made->width;
     FAILS(FROM(NULL, last, 0, depth, row, normal, 3 * row, NULL, 0, NULL, 0, out), SKEP_ERR_NULL,
           "stepper");
@@ -27,10 +28,10 @@ static void check_maps(const scene *made, const skep_stepper *stepper, uint32_t 
           "depth");
     FAILS(FROM(stepper, last, 0, depth, row, NULL, 3 * row, NULL, 0, NULL, 0, out), SKEP_ERR_NULL,
           "normal");
-    FAILS(FROM(stepper, last, 0, depth, row, normal, 3 * row, NULL, 0, NULL, 0, NULL), SKEP_ERR_NULL,
-          "state_out");
+    FAILS(FROM(stepper, last, 0, depth, row, normal, 3 * row, NULL, 0, NULL, 0, NULL),
+          SKEP_ERR_NULL, "estimate_out");
     FAILS(FROM(stepper, last + 1, 0, depth, row, normal, 3 * row, NULL, 0, NULL, 0, out),
-          SKEP_ERR_ARGUMENT, "step");
+          SKEP_ERR_ARGUMENT, "cycle");
     FAILS(FROM(stepper, last, 9, depth, row, normal, 3 * row, NULL, 0, NULL, 0, out),
           SKEP_ERR_ARGUMENT, "view");
     FAILS(FROM(stepper, last, 0, depth, row - 1, normal, 3 * row, NULL, 0, NULL, 0, out),
@@ -80,29 +81,30 @@ static void check_getters(const skep_estimate *estimate, size_t pixels) {
     FAILS(skep_estimate_get_maps(NULL, OUT(float, 0), NULL, NULL, NULL, pixels), SKEP_ERR_NULL,
           "estimate");
     const size_t less = pixels - 1;
-    FAILS(skep_estimate_get_maps(estimate, OUT(float, 0), OUT(float, 1), OUT(float, 2), OUT(uint8_t, 3),
-                              less),
+    FAILS(skep_estimate_get_maps(estimate, OUT(float, 0), OUT(float, 1), OUT(float, 2),
+                                 OUT(uint8_t, 3), less),
           SKEP_ERR_CAPACITY, "depth");
-    FAILS(skep_estimate_get_maps(estimate, NULL, OUT(float, 1), NULL, NULL, less), SKEP_ERR_CAPACITY,
-          "normal");
+    FAILS(skep_estimate_get_maps(estimate, NULL, OUT(float, 1), NULL, NULL, less),
+          SKEP_ERR_CAPACITY, "normal");
     FAILS(skep_estimate_get_maps(estimate, NULL, NULL, OUT(float, 2), NULL, 0), SKEP_ERR_CAPACITY,
           "cost");
-    FAILS(skep_estimate_get_maps(estimate, NULL, NULL, NULL, OUT(uint8_t, 3), less), SKEP_ERR_CAPACITY,
-          "validated");
+    FAILS(skep_estimate_get_maps(estimate, NULL, NULL, NULL, OUT(uint8_t, 3), less),
+          SKEP_ERR_CAPACITY, "validated");
     FAILS(skep_estimate_save(NULL, OUT(uint8_t, 0), 9, OUT(size_t, 1)), SKEP_ERR_NULL, "estimate");
-    FAILS(skep_estimate_save(estimate, OUT(uint8_t, 0), 9, OUT(size_t, 1)), SKEP_ERR_CAPACITY, "buffer");
+    FAILS(skep_estimate_save(estimate, OUT(uint8_t, 0), 9, OUT(size_t, 1)), SKEP_ERR_CAPACITY,
+          "buffer");
     FAILS(skep_estimate_save(estimate, OUT(uint8_t, 0), 9, NULL), SKEP_ERR_NULL, "size_out");
     FAILS(skep_estimate_save(estimate, NULL, 0, NULL), SKEP_ERR_NULL, "size_out");
 }
 
 /* Every cut is refused, whether bytes are missing or too many; none is read past its end. */
 static void check_cuts(const skep_stepper *stepper, const uint8_t *bytes, size_t size) {
-    const size_t step = size / 200 + 1;
-    for (size_t cut = 0; cut < size; cut += cut < 300 ? 1 : step) {
+    const size_t stride = size / 200 + 1;
+    for (size_t cut = 0; cut < size; cut += cut < 300 ? 1 : stride) {
         guarded memory = guarded_take(cut);
         memcpy(memory.bytes, bytes, cut);
-        FAILS(skep_estimate_load(stepper, memory.bytes, cut, OUT(skep_estimate *, 0)), SKEP_ERR_ARGUMENT,
-              "bytes is");
+        FAILS(skep_estimate_load(stepper, memory.bytes, cut, OUT(skep_estimate *, 0)),
+              SKEP_ERR_ARGUMENT, "bytes is");
         guarded_free(&memory);
     }
     uint8_t *longer = take(size + 9, 1);
@@ -114,7 +116,7 @@ static void check_cuts(const skep_stepper *stepper, const uint8_t *bytes, size_t
     free(longer);
     FAILS(skep_estimate_load(NULL, bytes, size, OUT(skep_estimate *, 0)), SKEP_ERR_NULL, "stepper");
     FAILS(skep_estimate_load(stepper, NULL, size, OUT(skep_estimate *, 0)), SKEP_ERR_NULL, "bytes");
-    FAILS(skep_estimate_load(stepper, bytes, size, NULL), SKEP_ERR_NULL, "state_out");
+    FAILS(skep_estimate_load(stepper, bytes, size, NULL), SKEP_ERR_NULL, "estimate_out");
     FAILS(skep_estimate_load(stepper, bytes, SIZE_MAX, OUT(skep_estimate *, 0)), SKEP_ERR_ARGUMENT,
           "bytes");
 }
@@ -124,7 +126,8 @@ static uint32_t next_random(uint32_t *estimate) {
     return *estimate >> 8;
 }
 
-/* A estimate that was garbled and yet passes may be wrong, but a step with it ends like any other. */
+/* An estimate that was garbled and yet passes may be wrong, but a cycle with it ends like any
+ * other. */
 static void use(const scene *made, const skep_stepper *stepper, skep_estimate *estimate) {
     const skep_estimate *estimates[MAX_VIEWS] = {NULL};
     skep_estimate_info info;
@@ -138,7 +141,8 @@ static void use(const scene *made, const skep_stepper *stepper, skep_estimate *e
     skep_candidates *candidates = NULL;
     uint32_t following = 0;
     const skep_status statuses[] = {
-        skep_stepper_propagate(stepper, 1, (info.view + 1) % made->views, estimates, made->views, &candidates),
+        skep_stepper_propagate(stepper, 1, (info.view + 1) % made->views, estimates, made->views,
+                               &candidates),
         skep_stepper_search(stepper, 1, info.view, estimates, made->views, NULL, NULL, NULL, &next),
         skep_stepper_upsample(stepper, 2, info.view, estimate, &finer),
         skep_stepper_next(stepper, 1, estimates, made->views, &following),
@@ -190,14 +194,15 @@ static void check_garbled(const scene *made, const skep_stepper *stepper, const 
     for (size_t field = 0; field < 5; ++field) {
         memcpy(garbled, bytes, size);
         memcpy(garbled + size - 26 + 4 * field, &not_a_number, sizeof not_a_number);
-        FAILS(skep_estimate_load(stepper, garbled, size, OUT(skep_estimate *, 0)), SKEP_ERR_ARGUMENT,
-              "bytes");
+        FAILS(skep_estimate_load(stepper, garbled, size, OUT(skep_estimate *, 0)),
+              SKEP_ERR_ARGUMENT, "bytes");
     }
     /* So is a pixel that is validated without a depth. */
     memcpy(garbled, bytes, size);
     memset(garbled + size - 26, 0, 4);
     garbled[size - 26 + 21] = 1;
-    FAILS(skep_estimate_load(stepper, garbled, size, OUT(skep_estimate *, 0)), SKEP_ERR_ARGUMENT, "bytes");
+    FAILS(skep_estimate_load(stepper, garbled, size, OUT(skep_estimate *, 0)), SKEP_ERR_ARGUMENT,
+          "bytes");
     free(garbled);
 }
 
@@ -217,7 +222,8 @@ void test_misuse_estimates(const char *folder) {
     for (uint32_t view = 0; view < made.views; ++view) {
         REQUIRE(skep_stepper_search(stepper, 0, view, NULL, 0, NULL, NULL, NULL, &searched[view]));
     }
-    REQUIRE(skep_stepper_check(stepper, 0, 0, (const skep_estimate *const *)searched, made.views, &estimate));
+    REQUIRE(skep_stepper_check(stepper, 0, 0, (const skep_estimate *const *)searched, made.views,
+                               &estimate));
     check_getters(estimate, (size_t)width * height);
     size_t size = 0;
     REQUIRE(skep_estimate_save(estimate, NULL, 0, &size));

@@ -72,7 +72,7 @@ static void check_windows(void) {
 
 static void check_correlations(const scene *made) {
     skep_ncc_window *window = make_window();
-    skep_packed_image *reference = make_samples(made, 0), *source = make_samples(made, 1);
+    skep_packed_image *reference = make_packed_image(made, 0), *source = make_packed_image(made, 1);
     const uint32_t w = made->width, h = made->height;
     const uint32_t pixels[4] = {3, 4, w - 1, h - 1}, right[4] = {3, 4, w, 0},
                    below[4] = {0, h, 3, 4};
@@ -104,7 +104,7 @@ static void check_correlations(const scene *made) {
     REQUIRE(skep_patch_ncc(window, reference, source, pixels, homographies, 2, ncc));
     FAILS(skep_packed_image_create(NULL, OUT(skep_packed_image *, 0)), SKEP_ERR_NULL, "image");
     const skep_image image = scene_image(made, 0);
-    FAILS(skep_packed_image_create(&image, NULL), SKEP_ERR_NULL, "samples_out");
+    FAILS(skep_packed_image_create(&image, NULL), SKEP_ERR_NULL, "packed_image_out");
     skep_packed_image_destroy(source);
     skep_packed_image_destroy(reference);
     skep_ncc_window_destroy(window);
@@ -114,7 +114,7 @@ static void check_correlations(const scene *made) {
 static void check_extremes(const scene *made) {
     static const double SIZES[] = {1e-300, 1e-30, 1e30, 1e300};
     skep_ncc_window *window = make_window();
-    skep_packed_image *samples = make_samples(made, 0);
+    skep_packed_image *samples = make_packed_image(made, 0);
     for (int i = 0; i < 4; ++i) {
         for (int j = 0; j < 9; ++j) {
             double homography[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};

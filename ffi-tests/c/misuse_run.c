@@ -17,17 +17,17 @@ static void check_runs(const skep_scene *handed_in) {
           "scene");
     FAILS(skep_reconstruct(handed_in, options, NULL, NULL, NULL), SKEP_ERR_NULL, "result_out");
     /* Options that are right alone and wrong together. */
-    REQUIRE(skep_options_set(options, "triangulation_angle.min", 90));
+    REQUIRE(skep_options_set(options, "min_triangulation_angle", 90));
     FAILS(skep_reconstruct(handed_in, options, NULL, NULL, OUT(skep_result *, 0)),
-          SKEP_ERR_ARGUMENT, "triangulation_angle.max");
+          SKEP_ERR_ARGUMENT, "max_triangulation_angle");
     FAILS(skep_stepper_create(handed_in, options, OUT(skep_stepper *, 0)), SKEP_ERR_ARGUMENT,
           "triangulation_angle");
-    REQUIRE(skep_options_set(options, "triangulation_angle.min", 4));
-    REQUIRE(skep_options_set(options, "focused_views", 1));
+    REQUIRE(skep_options_set(options, "min_triangulation_angle", 4));
+    REQUIRE(skep_options_set(options, "max_views_per_pixel", 1));
     FAILS(skep_reconstruct(handed_in, options, NULL, NULL, OUT(skep_result *, 0)),
-          SKEP_ERR_ARGUMENT, "focused_views");
+          SKEP_ERR_ARGUMENT, "max_views_per_pixel");
     FAILS(skep_fuse(NULL, 0, options, NULL, NULL, OUT(skep_cloud *, 0)), SKEP_ERR_ARGUMENT,
-          "focused_views");
+          "max_views_per_pixel");
     skep_options_destroy(options);
 }
 
@@ -51,7 +51,7 @@ static skep_status get_cost(const skep_result *result, uint32_t view, void *out,
 }
 
 static skep_status get_status(const skep_result *result, uint32_t view, void *out,
-                               size_t stride_bytes) {
+                              size_t stride_bytes) {
     return skep_result_get_status(result, view, out, stride_bytes);
 }
 
@@ -69,7 +69,7 @@ static void check_maps(const scene *made, const skep_result *result) {
     static const struct {
         get_map *get;
         size_t size;
-    } MAPS[] = {{get_depth, 4},   {get_normal, 12}, {get_cost, 4},
+    } MAPS[] = {{get_depth, 4},  {get_normal, 12}, {get_cost, 4},
                 {get_status, 1}, {get_count, 2},   {get_bits, 4}};
     void *out = OUT(char, 0);
     for (size_t i = 0; i < sizeof MAPS / sizeof MAPS[0]; ++i) {
@@ -94,7 +94,8 @@ static void check_maps(const scene *made, const skep_result *result) {
 }
 
 static void check_results(const skep_result *result) {
-    FAILS(skep_result_get_views(NULL, OUT(uint32_t, 0), 9, OUT(size_t, 1)), SKEP_ERR_NULL, "result");
+    FAILS(skep_result_get_views(NULL, OUT(uint32_t, 0), 9, OUT(size_t, 1)), SKEP_ERR_NULL,
+          "result");
     FAILS(skep_result_get_views(result, NULL, 0, NULL), SKEP_ERR_NULL, "count_out");
     FAILS(skep_result_get_views(result, OUT(uint32_t, 0), 1, OUT(size_t, 1)), SKEP_ERR_CAPACITY,
           "views");
@@ -122,8 +123,8 @@ static void check_results(const skep_result *result) {
     FAILS(skep_result_get_statistics(result, 0, NULL), SKEP_ERR_NULL, "statistics_out");
     FAILS(skep_result_get_statistics(result, 9, OUT(skep_statistics, 0)), SKEP_ERR_ARGUMENT,
           "view is 9");
-    FAILS(skep_result_get_cycles(NULL, 0, OUT(skep_cycle_record, 0), 9, OUT(size_t, 2)), SKEP_ERR_NULL,
-          "result");
+    FAILS(skep_result_get_cycles(NULL, 0, OUT(skep_cycle_record, 0), 9, OUT(size_t, 2)),
+          SKEP_ERR_NULL, "result");
     FAILS(skep_result_get_cycles(result, 9, OUT(skep_cycle_record, 0), 9, OUT(size_t, 2)),
           SKEP_ERR_ARGUMENT, "view is 9");
     FAILS(skep_result_get_cycles(result, 0, OUT(skep_cycle_record, 0), 1, OUT(size_t, 2)),
@@ -299,10 +300,9 @@ void test_misuse_run(const char *folder) {
     skep_options *options = quick_options();
     if (scene_is_small()) {
         /* Enough points to misuse take a cycle more at full size. */
-        const skep_scale scales[] = {
-            {.halvings = 1, .foods = 4, .first_iterations = 5, .cycles = 1, .cycle_iterations = 1},
-            {.halvings = 0, .foods = 3, .first_iterations = 1, .cycles = 2, .cycle_iterations = 1}};
-        REQUIRE(skep_options_set_scales(options, scales, 2));
+        REQUIRE(skep_options_set_text(options, "schedule.scales",
+                                      "downscale=2 food_sources=4 iterations=5+1x1; "
+                                      "downscale=1 food_sources=3 iterations=1+2x1"));
     }
     skep_scene *handed_in = scene_hand_in(&made);
     skep_result *result = scene_run(handed_in, options);

@@ -1,5 +1,6 @@
 /*
- * Errors of stepper: what does not belong together is refused by name, and the stepper go on working. /
+ * Errors of stepper: what does not belong together is refused by name, and the stepper go on
+ * working. /
  */
 #include "support/check.h"
 #include "support/results.h"
@@ -19,21 +20,23 @@ typedef struct stage {
     skep_estimate *fine[MAX_VIEWS];
 } stage;
 
-typedef const skep_estimate *const *state_list;
+typedef const skep_estimate *const *estimate_list;
 
 static void check_stepper(const stage *at, const skep_scene *handed_in) {
     FAILS(skep_stepper_create(NULL, NULL, OUT(skep_stepper *, 0)), SKEP_ERR_NULL, "scene");
-    FAILS(skep_stepper_create(handed_in, NULL, NULL), SKEP_ERR_NULL, "steps_out");
-    FAILS(skep_stepper_get_count(NULL, OUT(uint32_t, 0), OUT(uint32_t, 1)), SKEP_ERR_NULL, "stepper");
+    FAILS(skep_stepper_create(handed_in, NULL, NULL), SKEP_ERR_NULL, "stepper_out");
+    FAILS(skep_stepper_get_count(NULL, OUT(uint32_t, 0), OUT(uint32_t, 1)), SKEP_ERR_NULL,
+          "stepper");
     FAILS(skep_stepper_get_cycle(NULL, 0, OUT(skep_cycle, 0)), SKEP_ERR_NULL, "stepper");
-    FAILS(skep_stepper_get_cycle(at->stepper, 0, NULL), SKEP_ERR_NULL, "step_out");
+    FAILS(skep_stepper_get_cycle(at->stepper, 0, NULL), SKEP_ERR_NULL, "cycle_out");
     FAILS(skep_stepper_get_cycle(at->stepper, at->last + 1, OUT(skep_cycle, 0)), SKEP_ERR_ARGUMENT,
-          "step is");
-    FAILS(skep_stepper_get_cycle(at->stepper, SKEP_CYCLE_NONE, OUT(skep_cycle, 0)), SKEP_ERR_ARGUMENT,
-          "step is");
+          "cycle is");
+    FAILS(skep_stepper_get_cycle(at->stepper, SKEP_CYCLE_NONE, OUT(skep_cycle, 0)),
+          SKEP_ERR_ARGUMENT, "cycle is");
     FAILS(skep_stepper_get_size(NULL, 0, 0, OUT(uint32_t, 0), OUT(uint32_t, 1)), SKEP_ERR_NULL,
           "stepper");
-    FAILS(skep_stepper_get_size(at->stepper, 0, 0, NULL, OUT(uint32_t, 1)), SKEP_ERR_NULL, "width_out");
+    FAILS(skep_stepper_get_size(at->stepper, 0, 0, NULL, OUT(uint32_t, 1)), SKEP_ERR_NULL,
+          "width_out");
     FAILS(skep_stepper_get_size(at->stepper, 0, 0, OUT(uint32_t, 0), NULL), SKEP_ERR_NULL,
           "height_out");
     FAILS(skep_stepper_get_size(at->stepper, 0, 99, OUT(uint32_t, 0), OUT(uint32_t, 1)),
@@ -52,48 +55,58 @@ static void check_stepper(const stage *at, const skep_scene *handed_in) {
 }
 
 /* Each of these is refused by all calls that take estimates. */
-static void check_state_list(const stage *at, uint32_t step, state_list estimates, size_t count,
-                             skep_status status, const char *word) {
+static void check_estimate_list(const stage *at, uint32_t cycle, estimate_list estimates,
+                                size_t count, skep_status status, const char *word) {
     const skep_stepper *stepper = at->stepper;
-    FAILS(skep_stepper_propagate(stepper, step, 0, estimates, count, OUT(skep_candidates *, 0)), status, word);
-    FAILS(skep_stepper_search(stepper, step, 0, estimates, count, NULL, NULL, NULL, OUT(skep_estimate *, 0)),
+    FAILS(skep_stepper_propagate(stepper, cycle, 0, estimates, count, OUT(skep_candidates *, 0)),
           status, word);
-    FAILS(skep_stepper_check(stepper, step, 0, estimates, count, OUT(skep_estimate *, 0)), status, word);
-    FAILS(skep_stepper_next(stepper, step, estimates, count, OUT(uint32_t, 0)), status, word);
-    if (step == at->last) {
-        FAILS(skep_stepper_finish(stepper, 0, estimates, count, NULL, NULL, OUT(skep_result *, 0)), status,
-              word);
+    FAILS(skep_stepper_search(stepper, cycle, 0, estimates, count, NULL, NULL, NULL,
+                              OUT(skep_estimate *, 0)),
+          status, word);
+    FAILS(skep_stepper_check(stepper, cycle, 0, estimates, count, OUT(skep_estimate *, 0)), status,
+          word);
+    FAILS(skep_stepper_next(stepper, cycle, estimates, count, OUT(uint32_t, 0)), status, word);
+    if (cycle == at->last) {
+        FAILS(skep_stepper_finish(stepper, 0, estimates, count, NULL, NULL, OUT(skep_result *, 0)),
+              status, word);
     }
 }
 
-static void check_state_lists(const stage *at) {
+static void check_estimate_lists(const stage *at) {
     const uint32_t views = at->made->views;
     const skep_estimate *swapped[MAX_VIEWS] = {at->fine[1], at->fine[0]};
-    check_state_list(at, at->last, NULL, views, SKEP_ERR_NULL, "estimates");
-    check_state_list(at, at->last, (state_list)at->fine, views - 1, SKEP_ERR_ARGUMENT, "estimates is");
-    check_state_list(at, at->last, (state_list)at->fine, 1, SKEP_ERR_ARGUMENT, "estimates is 1");
-    check_state_list(at, at->last, (state_list)at->fine, SIZE_MAX, SKEP_ERR_ARGUMENT, "estimates");
-    check_state_list(at, at->last, swapped, views, SKEP_ERR_ARGUMENT,
-                     "estimates[0] is the state of view 1");
-    check_state_list(at, at->last, (state_list)at->coarse, views, SKEP_ERR_ARGUMENT, "handed up");
-    check_state_list(at, 0, (state_list)at->fine, views, SKEP_ERR_ARGUMENT, "estimates[0]");
-    check_state_list(at, at->last + 1, (state_list)at->fine, views, SKEP_ERR_ARGUMENT, "step is");
-    check_state_list(at, SKEP_CYCLE_NONE, (state_list)at->fine, views, SKEP_ERR_ARGUMENT, "step is");
+    check_estimate_list(at, at->last, NULL, views, SKEP_ERR_NULL, "estimates");
+    check_estimate_list(at, at->last, (estimate_list)at->fine, views - 1, SKEP_ERR_ARGUMENT,
+                        "estimates is");
+    check_estimate_list(at, at->last, (estimate_list)at->fine, 1, SKEP_ERR_ARGUMENT,
+                        "estimates is 1");
+    check_estimate_list(at, at->last, (estimate_list)at->fine, SIZE_MAX, SKEP_ERR_ARGUMENT,
+                        "estimates");
+    check_estimate_list(at, at->last, swapped, views, SKEP_ERR_ARGUMENT,
+                        "estimates[0] is the estimate of view 1");
+    check_estimate_list(at, at->last, (estimate_list)at->coarse, views, SKEP_ERR_ARGUMENT,
+                        "coarser scale");
+    check_estimate_list(at, 0, (estimate_list)at->fine, views, SKEP_ERR_ARGUMENT, "estimates[0]");
+    check_estimate_list(at, at->last + 1, (estimate_list)at->fine, views, SKEP_ERR_ARGUMENT,
+                        "cycle is");
+    check_estimate_list(at, SKEP_CYCLE_NONE, (estimate_list)at->fine, views, SKEP_ERR_ARGUMENT,
+                        "cycle is");
 }
 
 static void check_order(const stage *at) {
     const skep_stepper *stepper = at->stepper;
     const uint32_t views = at->made->views;
-    state_list searched = (state_list)at->searched, coarse = (state_list)at->coarse;
+    estimate_list searched = (estimate_list)at->searched, coarse = (estimate_list)at->coarse;
     /* Searched estimates are to be checked first, checked ones are not checked again. */
     FAILS(skep_stepper_propagate(stepper, 1, 0, searched, views, OUT(skep_candidates *, 0)),
           SKEP_ERR_ARGUMENT, "not yet checked");
-    FAILS(skep_stepper_search(stepper, 1, 0, searched, views, NULL, NULL, NULL, OUT(skep_estimate *, 0)),
+    FAILS(skep_stepper_search(stepper, 1, 0, searched, views, NULL, NULL, NULL,
+                              OUT(skep_estimate *, 0)),
           SKEP_ERR_ARGUMENT, "estimates[0] is searched and not yet checked");
     FAILS(skep_stepper_next(stepper, 0, searched, views, OUT(uint32_t, 0)), SKEP_ERR_ARGUMENT,
           "not yet checked");
-    FAILS(skep_stepper_check(stepper, 0, 0, coarse, views, OUT(skep_estimate *, 0)), SKEP_ERR_ARGUMENT,
-          "estimates[0] is checked");
+    FAILS(skep_stepper_check(stepper, 0, 0, coarse, views, OUT(skep_estimate *, 0)),
+          SKEP_ERR_ARGUMENT, "estimates[0] is checked");
     FAILS(skep_stepper_upsample(stepper, at->last, 0, searched[0], OUT(skep_estimate *, 0)),
           SKEP_ERR_ARGUMENT, "estimate is searched");
     /* A check and an end need the view's own estimate, and full size. */
@@ -105,23 +118,25 @@ static void check_order(const stage *at) {
           SKEP_ERR_ARGUMENT, "estimates[0]");
     FAILS(skep_stepper_finish(stepper, 99, coarse, views, NULL, NULL, OUT(skep_result *, 0)),
           SKEP_ERR_ARGUMENT, "view is 99");
-    /* States are handed up to the next scale only, and keep their view. */
-    FAILS(skep_stepper_upsample(stepper, 1, 0, coarse[0], OUT(skep_estimate *, 0)), SKEP_ERR_ARGUMENT,
-          "scale before");
+    /* Estimates are upsampled to the next scale only, and keep their view. */
+    FAILS(skep_stepper_upsample(stepper, 1, 0, coarse[0], OUT(skep_estimate *, 0)),
+          SKEP_ERR_ARGUMENT, "scale before");
     FAILS(skep_stepper_upsample(stepper, at->last, 1, coarse[0], OUT(skep_estimate *, 0)),
           SKEP_ERR_ARGUMENT, "view 1");
     FAILS(skep_stepper_upsample(stepper, at->last, 0, at->fine[0], OUT(skep_estimate *, 0)),
           SKEP_ERR_ARGUMENT, "scale before");
-    FAILS(skep_stepper_upsample(stepper, 99, 0, coarse[0], OUT(skep_estimate *, 0)), SKEP_ERR_ARGUMENT,
-          "step is 99");
+    FAILS(skep_stepper_upsample(stepper, 99, 0, coarse[0], OUT(skep_estimate *, 0)),
+          SKEP_ERR_ARGUMENT, "cycle is 99");
     FAILS(skep_stepper_upsample(stepper, at->last, 99, coarse[0], OUT(skep_estimate *, 0)),
           SKEP_ERR_ARGUMENT, "view is 99");
-    /* Candidates are to one view, for one step. */
+    /* Candidates are to one view, for one cycle. */
     skep_candidates *candidates = NULL;
     REQUIRE(skep_stepper_propagate(stepper, 1, 0, coarse, views, &candidates));
-    FAILS(skep_stepper_search(stepper, 1, 1, coarse, views, candidates, NULL, NULL, OUT(skep_estimate *, 0)),
+    FAILS(skep_stepper_search(stepper, 1, 1, coarse, views, candidates, NULL, NULL,
+                              OUT(skep_estimate *, 0)),
           SKEP_ERR_ARGUMENT, "candidates");
-    FAILS(skep_stepper_search(stepper, 0, 0, coarse, views, candidates, NULL, NULL, OUT(skep_estimate *, 0)),
+    FAILS(skep_stepper_search(stepper, 0, 0, coarse, views, candidates, NULL, NULL,
+                              OUT(skep_estimate *, 0)),
           SKEP_ERR_ARGUMENT, "candidates");
     skep_candidates_destroy(candidates);
 }
@@ -129,22 +144,27 @@ static void check_order(const stage *at) {
 static void check_null(const stage *at) {
     const skep_stepper *stepper = at->stepper;
     const uint32_t views = at->made->views;
-    state_list estimates = (state_list)at->coarse;
-    FAILS(skep_stepper_propagate(NULL, 1, 0, estimates, views, OUT(skep_candidates *, 0)), SKEP_ERR_NULL,
-          "stepper");
-    FAILS(skep_stepper_propagate(stepper, 1, 0, estimates, views, NULL), SKEP_ERR_NULL, "offers_out");
-    FAILS(skep_stepper_search(NULL, 1, 0, estimates, views, NULL, NULL, NULL, OUT(skep_estimate *, 0)),
+    estimate_list estimates = (estimate_list)at->coarse;
+    FAILS(skep_stepper_propagate(NULL, 1, 0, estimates, views, OUT(skep_candidates *, 0)),
           SKEP_ERR_NULL, "stepper");
-    FAILS(skep_stepper_search(stepper, 1, 0, estimates, views, NULL, NULL, NULL, NULL), SKEP_ERR_NULL,
-          "state_out");
-    FAILS(skep_stepper_search(stepper, 1, 99, estimates, views, NULL, NULL, NULL, OUT(skep_estimate *, 0)),
+    FAILS(skep_stepper_propagate(stepper, 1, 0, estimates, views, NULL), SKEP_ERR_NULL,
+          "candidates_out");
+    FAILS(skep_stepper_search(NULL, 1, 0, estimates, views, NULL, NULL, NULL,
+                              OUT(skep_estimate *, 0)),
+          SKEP_ERR_NULL, "stepper");
+    FAILS(skep_stepper_search(stepper, 1, 0, estimates, views, NULL, NULL, NULL, NULL),
+          SKEP_ERR_NULL, "estimate_out");
+    FAILS(skep_stepper_search(stepper, 1, 99, estimates, views, NULL, NULL, NULL,
+                              OUT(skep_estimate *, 0)),
           SKEP_ERR_ARGUMENT, "view is 99");
     FAILS(skep_stepper_check(NULL, 1, 0, estimates, views, OUT(skep_estimate *, 0)), SKEP_ERR_NULL,
           "stepper");
-    FAILS(skep_stepper_check(stepper, 1, 0, estimates, views, NULL), SKEP_ERR_NULL, "state_out");
-    FAILS(skep_stepper_upsample(NULL, 2, 0, estimates[0], OUT(skep_estimate *, 0)), SKEP_ERR_NULL, "stepper");
-    FAILS(skep_stepper_upsample(stepper, 2, 0, NULL, OUT(skep_estimate *, 0)), SKEP_ERR_NULL, "estimate");
-    FAILS(skep_stepper_upsample(stepper, 2, 0, estimates[0], NULL), SKEP_ERR_NULL, "state_out");
+    FAILS(skep_stepper_check(stepper, 1, 0, estimates, views, NULL), SKEP_ERR_NULL, "estimate_out");
+    FAILS(skep_stepper_upsample(NULL, 2, 0, estimates[0], OUT(skep_estimate *, 0)), SKEP_ERR_NULL,
+          "stepper");
+    FAILS(skep_stepper_upsample(stepper, 2, 0, NULL, OUT(skep_estimate *, 0)), SKEP_ERR_NULL,
+          "estimate");
+    FAILS(skep_stepper_upsample(stepper, 2, 0, estimates[0], NULL), SKEP_ERR_NULL, "estimate_out");
     FAILS(skep_stepper_next(NULL, 1, estimates, views, OUT(uint32_t, 0)), SKEP_ERR_NULL, "stepper");
     FAILS(skep_stepper_next(stepper, 1, estimates, views, NULL), SKEP_ERR_NULL, "next_out");
     FAILS(skep_stepper_finish(NULL, 0, estimates, views, NULL, NULL, OUT(skep_result *, 0)),
@@ -153,15 +173,15 @@ static void check_null(const stage *at) {
           "result_out");
 }
 
-/* States of another scene, whose pictures have another size. */
+/* Estimates of another scene, whose pictures have another size. */
 static void check_foreign(const stage *at, const skep_options *options) {
     scene other;
     scene_make_sized(&other, at->made->views, at->made->width - 2, at->made->height);
     skep_scene *handed_in = scene_hand_in(&other);
     skep_stepper *stepper = NULL;
     REQUIRE(skep_stepper_create(handed_in, options, &stepper));
-    FAILS(skep_stepper_search(stepper, 1, 0, (state_list)at->coarse, other.views, NULL, NULL, NULL,
-                            OUT(skep_estimate *, 0)),
+    FAILS(skep_stepper_search(stepper, 1, 0, (estimate_list)at->coarse, other.views, NULL, NULL,
+                              NULL, OUT(skep_estimate *, 0)),
           SKEP_ERR_ARGUMENT, "estimates[0]");
     FAILS(skep_stepper_upsample(stepper, at->last, 0, at->coarse[0], OUT(skep_estimate *, 0)),
           SKEP_ERR_ARGUMENT, "estimate");
@@ -173,13 +193,14 @@ static void check_foreign(const stage *at, const skep_options *options) {
 static void prepare(stage *at) {
     const uint32_t views = at->made->views;
     for (uint32_t view = 0; view < views; ++view) {
-        REQUIRE(
-            skep_stepper_search(at->stepper, 0, view, NULL, 0, NULL, NULL, NULL, &at->searched[view]));
+        REQUIRE(skep_stepper_search(at->stepper, 0, view, NULL, 0, NULL, NULL, NULL,
+                                    &at->searched[view]));
     }
     for (uint32_t view = 0; view < views; ++view) {
-        REQUIRE(skep_stepper_check(at->stepper, 0, view, (state_list)at->searched, views,
-                                 &at->coarse[view]));
-        REQUIRE(skep_stepper_upsample(at->stepper, at->last, view, at->coarse[view], &at->fine[view]));
+        REQUIRE(skep_stepper_check(at->stepper, 0, view, (estimate_list)at->searched, views,
+                                   &at->coarse[view]));
+        REQUIRE(
+            skep_stepper_upsample(at->stepper, at->last, view, at->coarse[view], &at->fine[view]));
     }
 }
 
@@ -195,14 +216,14 @@ void test_misuse_stepper(const char *folder) {
     at.last -= 1;
     prepare(&at);
     check_stepper(&at, handed_in);
-    check_state_lists(&at);
+    check_estimate_lists(&at);
     check_order(&at);
     check_null(&at);
     check_foreign(&at, options);
     /* After all that was refused, the stepper go on. */
     skep_estimate *next = NULL;
-    REQUIRE(skep_stepper_search(at.stepper, at.last, 0, (state_list)at.fine, made.views, NULL, NULL,
-                              NULL, &next));
+    REQUIRE(skep_stepper_search(at.stepper, at.last, 0, (estimate_list)at.fine, made.views, NULL,
+                                NULL, NULL, &next));
     skep_estimate_destroy(next);
     for (uint32_t view = 0; view < made.views; ++view) {
         skep_estimate_destroy(at.fine[view]);

@@ -11,17 +11,17 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-static skep_estimate *true_state(const scene *made, const skep_stepper *stepper, uint32_t step,
-                              uint32_t view) {
+static skep_estimate *true_estimate(const scene *made, const skep_stepper *stepper, uint32_t cycle,
+                                    uint32_t view) {
     const photograph *truth = &made->photographs[view];
     skep_estimate *estimate = NULL;
-    REQUIRE(skep_estimate_from_maps(stepper, step, view, truth->depth, 4 * made->width, truth->normal,
-                                 12 * made->width, NULL, 0, NULL, 0, &estimate));
+    REQUIRE(skep_estimate_from_maps(stepper, cycle, view, truth->depth, 4 * made->width,
+                                    truth->normal, 12 * made->width, NULL, 0, NULL, 0, &estimate));
     return estimate;
 }
 
 /* What goes in comes out, with masks of validity, costs, and rows apart. */
-static void check_round_trip(const scene *made, const skep_stepper *stepper, uint32_t step) {
+static void check_round_trip(const scene *made, const skep_stepper *stepper, uint32_t cycle) {
     const size_t pixels = scene_pixels(made), width = made->width, stride = width + 2;
     const photograph *truth = &made->photographs[2];
     float *depth = take(stride * made->height, sizeof *depth);
@@ -35,11 +35,11 @@ static void check_round_trip(const scene *made, const skep_stepper *stepper, uin
         valid += i % 5 && validated[i];
     }
     skep_estimate *estimate = NULL;
-    REQUIRE(skep_estimate_from_maps(stepper, step, 2, depth, 4 * stride, truth->normal, 12 * width,
-                                 validated, width, cost, 4 * width, &estimate));
+    REQUIRE(skep_estimate_from_maps(stepper, cycle, 2, depth, 4 * stride, truth->normal, 12 * width,
+                                    validated, width, cost, 4 * width, &estimate));
     skep_estimate_info info;
     REQUIRE(skep_estimate_get_info(estimate, &info));
-    CHECK(info.view == 2 && info.step == step && info.is_checked == 1 && info.reserved == 0,
+    CHECK(info.view == 2 && info.cycle == cycle && info.is_checked == 1 && info.reserved == 0,
           "what it is");
     CHECK(info.pixels == pixels && info.validated == valid, "%llu validated",
           (unsigned long long)info.validated);
@@ -48,7 +48,8 @@ static void check_round_trip(const scene *made, const skep_stepper *stepper, uin
           *normal_back = take(pixels, 3 * sizeof(float));
     float *cost_back = take(pixels, sizeof *cost_back);
     uint8_t *validated_back = take(pixels, 1);
-    REQUIRE(skep_estimate_get_maps(estimate, depth_back, normal_back, cost_back, validated_back, pixels));
+    REQUIRE(skep_estimate_get_maps(estimate, depth_back, normal_back, cost_back, validated_back,
+                                   pixels));
     REQUIRE(skep_estimate_get_maps(estimate, NULL, NULL, NULL, NULL, 0));
     for (size_t i = 0; i < pixels; ++i) {
         const int is_there = i % 5 != 0;
@@ -79,26 +80,27 @@ static size_t right(const photograph *truth, const float *depth, size_t pixels) 
     return count;
 }
 
-/* A view with no state of its own takes the planes that the others' true maps offer it. */
-static void check_guidance(const scene *made, const skep_stepper *stepper, uint32_t step,
+/* A view with no planes of its own takes those that are transferred from the others' true maps. */
+static void check_guidance(const scene *made, const skep_stepper *stepper, uint32_t cycle,
                            skep_estimate **estimates) {
     const size_t pixels = scene_pixels(made);
     const photograph *truth = &made->photographs[0];
     float *nothing = take(pixels, sizeof *nothing), *depth = take(pixels, sizeof *depth);
     skep_estimate *true_own = estimates[0];
     estimates[0] = NULL;
-    REQUIRE(skep_estimate_from_maps(stepper, step, 0, nothing, 4 * made->width, truth->normal,
-                                 12 * made->width, NULL, 0, NULL, 0, &estimates[0]));
+    REQUIRE(skep_estimate_from_maps(stepper, cycle, 0, nothing, 4 * made->width, truth->normal,
+                                    12 * made->width, NULL, 0, NULL, 0, &estimates[0]));
     size_t found[2];
-    for (int is_offered = 0; is_offered < 2; ++is_offered) {
+    for (int is_given = 0; is_given < 2; ++is_given) {
         skep_candidates *candidates = NULL;
         skep_estimate *searched = NULL;
-        REQUIRE(skep_stepper_propagate(stepper, step, 0, (const skep_estimate *const *)estimates, made->views,
-                                     &candidates));
-        REQUIRE(skep_stepper_search(stepper, step, 0, (const skep_estimate *const *)estimates, made->views,
-                                  is_offered ? candidates : NULL, NULL, NULL, &searched));
+        REQUIRE(skep_stepper_propagate(stepper, cycle, 0, (const skep_estimate *const *)estimates,
+                                       made->views, &candidates));
+        REQUIRE(skep_stepper_search(stepper, cycle, 0, (const skep_estimate *const *)estimates,
+                                    made->views, is_given ? candidates : NULL, NULL, NULL,
+                                    &searched));
         REQUIRE(skep_estimate_get_maps(searched, depth, NULL, NULL, NULL, pixels));
-        found[is_offered] = right(truth, depth, pixels);
+        found[is_given] = right(truth, depth, pixels);
         skep_estimate_info info;
         REQUIRE(skep_estimate_get_info(searched, &info));
         CHECK(info.is_checked == 0 && info.validated == 0 && info.ncc_evaluations > pixels,
@@ -120,11 +122,12 @@ static void check_guidance(const scene *made, const skep_stepper *stepper, uint3
 }
 
 /* Finished as they are, true maps match well and are all validated. */
-static void check_finished(const scene *made, const skep_stepper *stepper, skep_estimate **estimates) {
+static void check_finished(const scene *made, const skep_stepper *stepper,
+                           skep_estimate **estimates) {
     const size_t pixels = scene_pixels(made);
     skep_result *result = NULL;
-    REQUIRE(skep_stepper_finish(stepper, 1, (const skep_estimate *const *)estimates, made->views, NULL, NULL,
-                              &result));
+    REQUIRE(skep_stepper_finish(stepper, 1, (const skep_estimate *const *)estimates, made->views,
+                                NULL, NULL, &result));
     view_maps maps = maps_of(result, 1);
     CHECK(same_bytes(maps.depth[0], made->photographs[1].depth, 4 * pixels), "the maps given");
     CHECK(maps.statistics.status_counts[SKEP_PIXEL_VALIDATED] == pixels, "all are validated");
@@ -140,18 +143,18 @@ static void check_finished(const scene *made, const skep_stepper *stepper, skep_
 
 /* Averaged between views, true maps stay true: the views agree. */
 static void check_averaged(const scene *made, const skep_scene *handed_in, skep_options *options) {
-    REQUIRE(skep_options_set(options, "average_views", 1));
+    REQUIRE(skep_options_set(options, "cross_view_averaging", 1));
     skep_stepper *stepper = NULL;
     uint32_t count = 0;
     REQUIRE(skep_stepper_create(handed_in, options, &stepper));
     REQUIRE(skep_stepper_get_count(stepper, &count, NULL));
     skep_estimate *estimates[MAX_VIEWS] = {NULL};
     for (uint32_t view = 0; view < made->views; ++view) {
-        estimates[view] = true_state(made, stepper, count - 1, view);
+        estimates[view] = true_estimate(made, stepper, count - 1, view);
     }
     skep_result *result = NULL;
-    REQUIRE(skep_stepper_finish(stepper, 1, (const skep_estimate *const *)estimates, made->views, NULL, NULL,
-                              &result));
+    REQUIRE(skep_stepper_finish(stepper, 1, (const skep_estimate *const *)estimates, made->views,
+                                NULL, NULL, &result));
     view_maps maps = maps_of(result, 1);
     const photograph *truth = &made->photographs[1];
     size_t moved = 0;
@@ -174,7 +177,7 @@ void test_own_maps(const char *folder) {
     scene made;
     scene_make(&made);
     skep_options *options = quick_options();
-    REQUIRE(skep_options_set(options, "average_views", 0));
+    REQUIRE(skep_options_set(options, "cross_view_averaging", 0));
     skep_scene *handed_in = scene_hand_in(&made);
     skep_stepper *stepper = NULL;
     uint32_t count = 0;
@@ -189,7 +192,7 @@ void test_own_maps(const char *folder) {
 
     skep_estimate *estimates[MAX_VIEWS] = {NULL};
     for (uint32_t view = 0; view < made.views; ++view) {
-        estimates[view] = true_state(&made, stepper, last, view);
+        estimates[view] = true_estimate(&made, stepper, last, view);
     }
     check_guidance(&made, stepper, last, estimates);
     check_finished(&made, stepper, estimates);

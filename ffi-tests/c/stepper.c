@@ -1,5 +1,5 @@
 /*
- * A run taken step by step gives the same bits as a whole one, in any order of the views, and
+ * A run taken cycle by cycle gives the same bits as a whole one, in any order of the views, and
  * across saved estimates.
  */
 #include "support/check.h"
@@ -33,7 +33,7 @@ static void save_and_load(const skep_stepper *stepper, skep_estimate **estimate)
     replace(estimate, loaded);
     REQUIRE(skep_estimate_save(*estimate, again, size, &written));
     CHECK(written == size && same_bytes(bytes, again, size),
-          "a estimate that was loaded is saved the same");
+          "an estimate that was loaded is saved the same");
     free(again);
     free(bytes);
 }
@@ -43,11 +43,11 @@ static uint32_t nth(const by_hand *run, uint32_t n) {
     return run->is_reversed ? run->views - 1 - n : n;
 }
 
-static void take_step(by_hand *run, uint32_t step) {
+static void run_cycle(by_hand *run, uint32_t cycle) {
     const skep_estimate *const *estimates = (const skep_estimate *const *)run->estimates;
     skep_estimate *searched[MAX_VIEWS] = {NULL};
     skep_cycle now;
-    REQUIRE(skep_stepper_get_cycle(run->stepper, step, &now));
+    REQUIRE(skep_stepper_get_cycle(run->stepper, cycle, &now));
     for (uint32_t view = 0; view < run->views; ++view) {
         skep_cycle before;
         skep_estimate_info info;
@@ -55,21 +55,22 @@ static void take_step(by_hand *run, uint32_t step) {
             continue;
         }
         REQUIRE(skep_estimate_get_info(run->estimates[view], &info));
-        REQUIRE(skep_stepper_get_cycle(run->stepper, info.step, &before));
+        REQUIRE(skep_stepper_get_cycle(run->stepper, info.cycle, &before));
         CHECK(info.is_checked == 1 && info.view == view && info.reserved == 0, "view %u",
               (unsigned)view);
         if (before.downscale != now.downscale) {
             skep_estimate *finer = NULL;
-            REQUIRE(skep_stepper_upsample(run->stepper, step, view, run->estimates[view], &finer));
+            REQUIRE(skep_stepper_upsample(run->stepper, cycle, view, run->estimates[view], &finer));
             replace(&run->estimates[view], finer);
         }
     }
     for (uint32_t n = 0; n < run->views; ++n) {
         const uint32_t view = nth(run, n);
         skep_candidates *candidates = NULL;
-        REQUIRE(skep_stepper_propagate(run->stepper, step, view, estimates, run->views, &candidates));
-        REQUIRE(skep_stepper_search(run->stepper, step, view, estimates, run->views, candidates, NULL, NULL,
-                                  &searched[view]));
+        REQUIRE(
+            skep_stepper_propagate(run->stepper, cycle, view, estimates, run->views, &candidates));
+        REQUIRE(skep_stepper_search(run->stepper, cycle, view, estimates, run->views, candidates,
+                                    NULL, NULL, &searched[view]));
         skep_candidates_destroy(candidates);
         if (run->is_saved) {
             save_and_load(run->stepper, &searched[view]);
@@ -78,8 +79,8 @@ static void take_step(by_hand *run, uint32_t step) {
     for (uint32_t n = 0; n < run->views; ++n) {
         const uint32_t view = nth(run, n);
         skep_estimate *checked = NULL;
-        REQUIRE(skep_stepper_check(run->stepper, step, view, (const skep_estimate *const *)searched,
-                                 run->views, &checked));
+        REQUIRE(skep_stepper_check(run->stepper, cycle, view,
+                                   (const skep_estimate *const *)searched, run->views, &checked));
         if (run->is_saved) {
             save_and_load(run->stepper, &checked);
         }
@@ -120,19 +121,21 @@ static void check_by_hand(const scene *made, const skep_scene *handed_in,
                           const skep_options *options, const skep_stepper *stepper,
                           const skep_result *whole, int variant) {
     static const char *const NAMES[] = {"in order", "in reverse", "saved", "in reverse and saved"};
-    by_hand run = {
-        .stepper = stepper, .views = made->views, .is_reversed = variant & 1, .is_saved = variant >> 1};
-    for (uint32_t step = 0; step != SKEP_CYCLE_NONE;) {
-        take_step(&run, step);
-        REQUIRE(
-            skep_stepper_next(stepper, step, (const skep_estimate *const *)run.estimates, run.views, &step));
+    by_hand run = {.stepper = stepper,
+                   .views = made->views,
+                   .is_reversed = variant & 1,
+                   .is_saved = variant >> 1};
+    for (uint32_t cycle = 0; cycle != SKEP_CYCLE_NONE;) {
+        run_cycle(&run, cycle);
+        REQUIRE(skep_stepper_next(stepper, cycle, (const skep_estimate *const *)run.estimates,
+                                  run.views, &cycle));
     }
     view_maps maps[MAX_VIEWS];
     for (uint32_t n = 0; n < run.views; ++n) {
         const uint32_t view = nth(&run, n);
         skep_result *finished = NULL;
-        REQUIRE(skep_stepper_finish(stepper, view, (const skep_estimate *const *)run.estimates, run.views,
-                                  NULL, NULL, &finished));
+        REQUIRE(skep_stepper_finish(stepper, view, (const skep_estimate *const *)run.estimates,
+                                    run.views, NULL, NULL, &finished));
         maps[view] = maps_of(finished, view);
         view_maps expected = maps_of(whole, view);
         check_same_maps(&maps[view], &expected, NAMES[variant]);
@@ -156,21 +159,21 @@ static void check_by_hand(const scene *made, const skep_scene *handed_in,
 }
 
 static void check_stepper_themselves(const scene *made, const skep_scene *handed_in,
-                                   const skep_options *options, const skep_stepper *stepper) {
+                                     const skep_options *options, const skep_stepper *stepper) {
     uint32_t count = 0, views = 0;
     REQUIRE(skep_stepper_get_count(stepper, &count, &views));
     CHECK(count == 4 && views == made->views, "%u stepper of %u views", (unsigned)count,
           (unsigned)views);
     REQUIRE(skep_stepper_get_count(stepper, NULL, NULL));
-    for (uint32_t step = 0; step < count; ++step) {
+    for (uint32_t cycle = 0; cycle < count; ++cycle) {
         skep_cycle found;
         uint32_t width = 0, height = 0;
-        REQUIRE(skep_stepper_get_cycle(stepper, step, &found));
-        CHECK(found.downscale == (step < 2 ? 2 : 1) && found.cycle == step % 2, "step %u",
-              (unsigned)step);
-        CHECK(found.foods == (step < 2 ? 4 : 3), "step %u", (unsigned)step);
-        CHECK(found.iterations == (step == 0 ? 5 : 1), "step %u", (unsigned)step);
-        REQUIRE(skep_stepper_get_size(stepper, step, 1, &width, &height));
+        REQUIRE(skep_stepper_get_cycle(stepper, cycle, &found));
+        CHECK(found.downscale == (cycle < 2 ? 2 : 1) && found.cycle_on_scale == cycle % 2,
+              "cycle %u", (unsigned)cycle);
+        CHECK(found.food_sources == (cycle < 2 ? 4 : 3), "cycle %u", (unsigned)cycle);
+        CHECK(found.iterations == (cycle == 0 ? 5 : 1), "cycle %u", (unsigned)cycle);
+        REQUIRE(skep_stepper_get_size(stepper, cycle, 1, &width, &height));
         CHECK(width == (made->width + found.downscale - 1) / found.downscale, "%u",
               (unsigned)width);
         CHECK(height == (made->height + found.downscale - 1) / found.downscale, "%u",

@@ -65,8 +65,7 @@ static void check_agreement(const skep_camera *camera, const view_maps *maps) {
                               (float)((y - camera->cy) / camera->fy), 1};
         const float depth = maps->depth[SKEP_MAPS_RAW][i];
         ++counts[maps->status[i] & 7];
-        CHECK(maps->status[i] <= SKEP_PIXEL_OUT_OF_RANGE, "%u at %zu, %zu", maps->status[i], x,
-              y);
+        CHECK(maps->status[i] <= SKEP_PIXEL_OUT_OF_RANGE, "%u at %zu, %zu", maps->status[i], x, y);
         CHECK(depth == 0 || (depth >= (float)SCENE_NEAR / 2 && depth <= (float)SCENE_FAR * 2), "%g",
               depth);
         CHECK(depth == 0 || fabs(dot3(raw, raw) - 1) < 1e-5, "%g", dot3(raw, raw));
@@ -81,10 +80,11 @@ static void check_agreement(const skep_camera *camera, const view_maps *maps) {
         CHECK((maps->source_bits[i] & ~all) == 0, "%x of %zu sources",
               (unsigned)maps->source_bits[i], maps->source_total);
     }
-    CHECK(same_bytes(counts, maps->statistics.status_counts, sizeof counts), "outcomes are counted");
+    CHECK(same_bytes(counts, maps->statistics.status_counts, sizeof counts),
+          "statuses are counted");
     CHECK(maps->statistics.ncc_evaluations > pixels, "%llu",
           (unsigned long long)maps->statistics.ncc_evaluations);
-    CHECK(maps->statistics.samples > maps->statistics.ncc_evaluations,
+    CHECK(maps->statistics.bilinear_samples > maps->statistics.ncc_evaluations,
           "patches have several samples");
     CHECK(maps->statistics.early_terminations > 0, "some hypotheses are given up early");
     CHECK(maps->cycle_total >= 2, "%zu", maps->cycle_total);
@@ -107,7 +107,7 @@ static void check_strides(const skep_result *result, uint32_t view, const view_m
     const size_t width = maps->width, height = maps->height;
     const size_t sizes[] = {4, 12, 4, 1, 2, 4};
     const void *dense[] = {maps->depth[0], maps->normal[0],    maps->cost,
-                           maps->status,  maps->source_count, maps->source_bits};
+                           maps->status,   maps->source_count, maps->source_bits};
     for (int kind = 0; kind < 6; ++kind) {
         const size_t row = width * sizes[kind], stride = row + 7;
         guarded memory = guarded_take(rows_size(row, height, stride));
@@ -115,12 +115,24 @@ static void check_strides(const skep_result *result, uint32_t view, const view_m
         void *out = memory.bytes;
         skep_status status = SKEP_OK;
         switch (kind) {
-        case 0: status = skep_result_get_depth(result, view, SKEP_MAPS_RAW, out, stride); break;
-        case 1: status = skep_result_get_normal(result, view, SKEP_MAPS_RAW, out, stride); break;
-        case 2: status = skep_result_get_cost(result, view, out, stride); break;
-        case 3: status = skep_result_get_status(result, view, out, stride); break;
-        case 4: status = skep_result_get_source_count(result, view, out, stride); break;
-        case 5: status = skep_result_get_source_bits(result, view, 0, out, stride); break;
+        case 0:
+            status = skep_result_get_depth(result, view, SKEP_MAPS_RAW, out, stride);
+            break;
+        case 1:
+            status = skep_result_get_normal(result, view, SKEP_MAPS_RAW, out, stride);
+            break;
+        case 2:
+            status = skep_result_get_cost(result, view, out, stride);
+            break;
+        case 3:
+            status = skep_result_get_status(result, view, out, stride);
+            break;
+        case 4:
+            status = skep_result_get_source_count(result, view, out, stride);
+            break;
+        case 5:
+            status = skep_result_get_source_bits(result, view, 0, out, stride);
+            break;
         }
         REQUIRE(status);
         for (size_t y = 0; y < height; ++y) {
@@ -139,7 +151,7 @@ static void check_strides(const skep_result *result, uint32_t view, const view_m
     CHECK(same_bytes(depth, maps->depth[0], 4 * width * height), "borrowed depths");
     CHECK(same_bytes(normal, maps->normal[0], 12 * width * height), "borrowed normals");
     CHECK(same_bytes(cost, maps->cost, 4 * width * height), "borrowed costs");
-    CHECK(same_bytes(status, maps->status, width * height), "borrowed outcomes");
+    CHECK(same_bytes(status, maps->status, width * height), "borrowed statuses");
 }
 
 /*
@@ -187,8 +199,8 @@ static void check_cloud(const scene *made, const skep_result *result) {
     CHECK(next == cloud.view_total, "%zu of %zu views", next, cloud.view_total);
     CHECK(scene_is_small() || on_surface * 10 > cloud.count * 9, "%zu of %zu points", on_surface,
           cloud.count);
-    CHECK(scene_is_small() || right_color * 10 > cloud.count * 9, "%zu of %zu points",
-          right_color, cloud.count);
+    CHECK(scene_is_small() || right_color * 10 > cloud.count * 9, "%zu of %zu points", right_color,
+          cloud.count);
     points_free(&cloud);
 }
 

@@ -16,21 +16,18 @@ namespace {
 using check::must;
 using check::Owned;
 
-double our_angle(const skep_scene *scene, uint32_t a, uint32_t b)
-{
+double our_angle(const skep_scene *scene, uint32_t a, uint32_t b) {
     double degrees = 0;
     must(skep_scene_get_triangulation_angle(scene, a, b, &degrees));
     return degrees;
 }
 
-Eigen::Vector3d center_of(const scene::View &view)
-{
+Eigen::Vector3d center_of(const scene::View &view) {
     return Eigen::Vector3d(scene::center(view.camera).data());
 }
 
 // COLMAP's angles, in degrees, at all points that both views saw.
-std::vector<double> their_angles(const scene::Scene &made, uint32_t a, uint32_t b)
-{
+std::vector<double> their_angles(const scene::Scene &made, uint32_t a, uint32_t b) {
     std::vector<double> angles;
     for (const scene::Point &point : made.points) {
         const auto saw = [&](uint32_t view) {
@@ -47,8 +44,7 @@ std::vector<double> their_angles(const scene::Scene &made, uint32_t a, uint32_t 
 
 // The number that COLMAP gives an image in its maps, consistency graphs and visibilities is our
 // view's.
-void images_have_our_numbers(const scene::Scene &made, const colmap::mvs::Model &model)
-{
+void images_have_our_numbers(const scene::Scene &made, const colmap::mvs::Model &model) {
     std::printf("numbers of images\n");
     EXPECT(model.images.size() == made.views.size());
     for (uint32_t view = 0; view < made.views.size(); ++view) {
@@ -60,8 +56,7 @@ void images_have_our_numbers(const scene::Scene &made, const colmap::mvs::Model 
     EXPECT(model.points.size() == made.points.size());
 }
 
-void the_same_views_overlap(const skep_scene *scene, const colmap::mvs::Model &model)
-{
+void the_same_views_overlap(const skep_scene *scene, const colmap::mvs::Model &model) {
     std::printf("overlap\n");
     const std::vector<std::vector<int>> overlapping = model.GetMaxOverlappingImages(50, 0);
     for (uint32_t view = 0; view < overlapping.size(); ++view) {
@@ -79,8 +74,7 @@ void the_same_views_overlap(const skep_scene *scene, const colmap::mvs::Model &m
 // Both take the angle of rank round(0.75 (n - 1)) of n, so that no number of points makes a
 // difference. COLMAP's model reckons in floats.
 void angles_agree(const scene::Scene &made, const skep_scene *scene,
-                  const colmap::mvs::Model &model)
-{
+                  const colmap::mvs::Model &model) {
     std::printf("triangulation angles\n");
     const std::vector<std::map<int, float>> all = model.ComputeTriangulationAngles(75);
     double from_points = 0, from_model = 0, least = 180, most = 0;
@@ -105,8 +99,7 @@ void angles_agree(const scene::Scene &made, const skep_scene *scene,
 }
 
 // The same for all small numbers of points, where the rank must often be rounded.
-void ranks_agree(const scene::Scene &made)
-{
+void ranks_agree(const scene::Scene &made) {
     std::printf("ranks\n");
     scene::Scene few = made;
     for (size_t count = 3; count <= 20; ++count) {
@@ -125,8 +118,7 @@ void ranks_agree(const scene::Scene &made)
 
 // Views that look at a surface from opposite sides see nothing in common: theirs is the only large
 // angle, which COLMAP folds back to a small one.
-void obtuse_angles_stay_obtuse(const scene::Scene &made)
-{
+void obtuse_angles_stay_obtuse(const scene::Scene &made) {
     std::printf("views that face each other\n");
     scene::Scene facing = made;
     facing.views.resize(2);
@@ -148,8 +140,7 @@ void obtuse_angles_stay_obtuse(const scene::Scene &made)
 
 } // namespace
 
-int main()
-{
+int main() {
     std::setvbuf(stdout, nullptr, _IOLBF, 0);
     try {
         const scene::Scene made = scene::make();

@@ -15,8 +15,7 @@ using check::must;
 using scene::Vector;
 using Cloud = std::vector<Vector>;
 
-Cloud our_cloud(const skep_cloud *cloud)
-{
+Cloud our_cloud(const skep_cloud *cloud) {
     size_t count = 0;
     must(skep_cloud_get_count(cloud, &count, nullptr));
     Cloud points(count);
@@ -25,8 +24,7 @@ Cloud our_cloud(const skep_cloud *cloud)
     return points;
 }
 
-Cloud fuse_with_colmap(const std::string &folder, const colmap::mvs::StereoFusionOptions &options)
-{
+Cloud fuse_with_colmap(const std::string &folder, const colmap::mvs::StereoFusionOptions &options) {
     colmap::mvs::StereoFusion fusion(options, folder, "COLMAP", "", "geometric");
     // It tells its user much about itself, and us nothing new.
     std::cout.setstate(std::ios::failbit);
@@ -48,8 +46,7 @@ struct Spread {
     double most;
 };
 
-Spread spread_of(std::vector<double> distances)
-{
+Spread spread_of(std::vector<double> distances) {
     if (distances.empty()) {
         return {HUGE_VAL, HUGE_VAL};
     }
@@ -58,14 +55,12 @@ Spread spread_of(std::vector<double> distances)
 }
 
 // All are relative to the distance from the middle of the cameras, which is about 0.
-double depth_of(const Vector &point)
-{
+double depth_of(const Vector &point) {
     return std::sqrt(point[0] * point[0] + point[1] * point[1] + point[2] * point[2]);
 }
 
 // From a sample of the points of one cloud to the nearest point of the other.
-Spread nearest(const Cloud &from, const Cloud &to)
-{
+Spread nearest(const Cloud &from, const Cloud &to) {
     std::vector<double> distances;
     for (size_t index = 0; index < from.size(); index += 5) {
         const Vector &point = from[index];
@@ -79,8 +74,7 @@ Spread nearest(const Cloud &from, const Cloud &to)
     return spread_of(distances);
 }
 
-Spread to_surface(const Cloud &points)
-{
+Spread to_surface(const Cloud &points) {
     std::vector<double> distances;
     for (const Vector &point : points) {
         distances.push_back(scene::distance_to_surface(point) / depth_of(point));
@@ -90,8 +84,7 @@ Spread to_surface(const Cloud &points)
 
 // The workspace with a model that says what COLMAP's fusion, which puts pixel centers at whole
 // numbers, takes it to say.
-std::string with_whole_pixels(const std::string &folder)
-{
+std::string with_whole_pixels(const std::string &folder) {
     const std::string moved = scene::empty_folder("fusion-whole-pixels");
     for (const char *part : {"/images", "/stereo"}) {
         std::filesystem::create_symlink(folder + part, moved + part);
@@ -108,8 +101,7 @@ std::string with_whole_pixels(const std::string &folder)
     return moved;
 }
 
-void print(const char *what, const Spread &spread)
-{
+void print(const char *what, const Spread &spread) {
     std::printf("  %-44s half within %.5f, 99 %% within %.5f\n", what, spread.half, spread.most);
 }
 
@@ -122,13 +114,11 @@ struct Bounds {
     Spread surface;
 };
 
-bool within(const Spread &spread, const Spread &bound)
-{
+bool within(const Spread &spread, const Spread &bound) {
     return spread.half <= bound.half && spread.most <= bound.most;
 }
 
-void compare(const char *what, const Cloud &ours, const Cloud &theirs, const Bounds &bounds)
-{
+void compare(const char *what, const Cloud &ours, const Cloud &theirs, const Bounds &bounds) {
     const double share = double(theirs.size()) / ours.size();
     std::printf("%s: %zu points, %.3f of ours\n", what, theirs.size(), share);
     EXPECT(share >= bounds.least_points && share <= bounds.most_points);
@@ -143,8 +133,7 @@ void compare(const char *what, const Cloud &ours, const Cloud &theirs, const Bou
 
 } // namespace
 
-int main()
-{
+int main() {
     std::setvbuf(stdout, nullptr, _IOLBF, 0);
     try {
         const scene::Workspace workspace =

@@ -17,15 +17,13 @@ using Matrix = Eigen::Matrix3d;
 using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 // What takes the library's pixels to COLMAP's.
-Matrix half_a_pixel()
-{
+Matrix half_a_pixel() {
     Matrix shift = Matrix::Identity();
     shift(0, 2) = shift(1, 2) = half_pixel;
     return shift;
 }
 
-Matrix calibration_matrix(const skep_camera &camera)
-{
+Matrix calibration_matrix(const skep_camera &camera) {
     Matrix matrix;
     matrix << camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1;
     return matrix;
@@ -33,8 +31,7 @@ Matrix calibration_matrix(const skep_camera &camera)
 
 // From pixels of the reference to pixels of the source, in the library's convention.
 Matrix our_homography(const skep_camera &reference, const skep_camera &source,
-                      const skep_plane &plane)
-{
+                      const skep_plane &plane) {
     RowMajor homography;
     must(skep_plane_homographies(&reference, &source, &plane, 1, homography.data()));
     return homography;
@@ -43,8 +40,7 @@ Matrix our_homography(const skep_camera &reference, const skep_camera &source,
 // The same by COLMAP, in COLMAP's pixels. Its planes are normal . X = -distance too, which its
 // documentation leaves open.
 Matrix their_homography(const skep_camera &reference, const skep_camera &source,
-                        const skep_plane &plane)
-{
+                        const skep_plane &plane) {
     const Matrix rotation = rotation_of(source) * rotation_of(reference).transpose();
     const Eigen::Vector3d translation =
         translation_of(source) - rotation * translation_of(reference);
@@ -53,13 +49,11 @@ Matrix their_homography(const skep_camera &reference, const skep_camera &source,
         rotation, translation, Eigen::Vector3d(plane.normal), plane.distance);
 }
 
-double relative_difference(const Matrix &a, const Matrix &b)
-{
+double relative_difference(const Matrix &a, const Matrix &b) {
     return (a - b).cwiseAbs().maxCoeff() / b.cwiseAbs().maxCoeff();
 }
 
-void formulas_agree()
-{
+void formulas_agree() {
     std::printf("formulas\n");
     std::mt19937 random(3);
     std::uniform_real_distribution<double> unit(0, 1);
@@ -93,8 +87,7 @@ struct Gray {
     std::vector<uint8_t> values;
 };
 
-Gray gray_of(const scene::View &view)
-{
+Gray gray_of(const scene::View &view) {
     Gray gray = {view.width, view.height, {}};
     for (size_t pixel = 0; pixel < view.rgb.size(); pixel += 3) {
         gray.values.push_back((view.rgb[pixel] + view.rgb[pixel + 1] + view.rgb[pixel + 2]) / 3);
@@ -103,8 +96,7 @@ Gray gray_of(const scene::View &view)
 }
 
 // COLMAP's warp of an image by a homography, into the pixels of another.
-Gray warp(const Gray &image, const Matrix &homography, uint32_t width, uint32_t height)
-{
+Gray warp(const Gray &image, const Matrix &homography, uint32_t width, uint32_t height) {
     colmap::Bitmap source, target;
     source.Allocate(image.width, image.height, false);
     target.Allocate(width, height, false);
@@ -124,10 +116,9 @@ Gray warp(const Gray &image, const Matrix &homography, uint32_t width, uint32_t 
 
 // The library's correlation of patches at these pixels.
 std::vector<float> correlate(const Gray &reference, const Gray &source,
-                             const std::vector<uint32_t> &pixels, const Matrix &homography)
-{
+                             const std::vector<uint32_t> &pixels, const Matrix &homography) {
     Owned<skep_packed_image> samples[] = {{nullptr, skep_packed_image_destroy},
-                                     {nullptr, skep_packed_image_destroy}};
+                                          {nullptr, skep_packed_image_destroy}};
     const Gray *images[] = {&reference, &source};
     for (int side = 0; side < 2; ++side) {
         const Gray &gray = *images[side];
@@ -154,8 +145,7 @@ std::vector<float> correlate(const Gray &reference, const Gray &source,
 
 // A patch and its image by a homography correlate as the patch and what lies at the same place in
 // the image that COLMAP warped by that homography; but that image is rounded to whole gray values.
-void warps_agree()
-{
+void warps_agree() {
     const scene::Scene made = scene::make();
     const scene::View &reference = made.views[0];
     const Gray reference_gray = gray_of(reference);
@@ -210,8 +200,7 @@ void warps_agree()
 
 } // namespace
 
-int main()
-{
+int main() {
     std::setvbuf(stdout, nullptr, _IOLBF, 0);
     try {
         formulas_agree();

@@ -18,14 +18,12 @@ namespace {
 
 using check::must;
 
-bool same_bits(const std::vector<float> &a, const std::vector<float> &b)
-{
+bool same_bits(const std::vector<float> &a, const std::vector<float> &b) {
     return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
 }
 
 // COLMAP holds the channels one after the other, the library pixel by pixel.
-std::vector<float> pixel_by_pixel(const colmap::mvs::Mat<float> &planes)
-{
+std::vector<float> pixel_by_pixel(const colmap::mvs::Mat<float> &planes) {
     std::vector<float> values;
     for (size_t row = 0; row < planes.GetHeight(); ++row) {
         for (size_t column = 0; column < planes.GetWidth(); ++column) {
@@ -40,8 +38,7 @@ std::vector<float> pixel_by_pixel(const colmap::mvs::Mat<float> &planes)
 // The views of each pixel, as the library has them.
 using Graph = std::vector<std::vector<int>>;
 
-Graph graph_of(const colmap::mvs::ConsistencyGraph &graph, uint32_t width, uint32_t height)
-{
+Graph graph_of(const colmap::mvs::ConsistencyGraph &graph, uint32_t width, uint32_t height) {
     Graph views;
     for (uint32_t row = 0; row < height; ++row) {
         for (uint32_t column = 0; column < width; ++column) {
@@ -55,8 +52,7 @@ Graph graph_of(const colmap::mvs::ConsistencyGraph &graph, uint32_t width, uint3
 }
 
 // What the result says each pixel was matched with; nothing where it has no depth.
-Graph graph_of(const skep_result *result, uint32_t view, const std::vector<float> &depth)
-{
+Graph graph_of(const skep_result *result, uint32_t view, const std::vector<float> &depth) {
     uint32_t sources[32];
     size_t count = 0;
     must(skep_result_get_sources(result, view, sources, 32, &count));
@@ -76,8 +72,7 @@ Graph graph_of(const skep_result *result, uint32_t view, const std::vector<float
 }
 
 // COLMAP reads what is in the result, and what it then writes is the same file.
-void colmap_reads_our_maps(const scene::Workspace &workspace)
-{
+void colmap_reads_our_maps(const scene::Workspace &workspace) {
     std::printf("COLMAP reads our maps\n");
     const std::string copy = scene::empty_folder("maps-copy") + "/copy.bin";
     size_t empty = 0, pixels = 0, listed = 0;
@@ -130,8 +125,7 @@ void colmap_reads_our_maps(const scene::Workspace &workspace)
 }
 
 // Both write the same bytes of made-up maps and read them back, whatever the size.
-void maps_are_the_same_both_ways(uint32_t width, uint32_t height)
-{
+void maps_are_the_same_both_ways(uint32_t width, uint32_t height) {
     std::printf("maps of %u x %u\n", width, height);
     const std::string folder = scene::empty_folder("maps-made");
     const std::string ours = folder + "/ours.bin", theirs = folder + "/theirs.bin";
@@ -184,8 +178,7 @@ void maps_are_the_same_both_ways(uint32_t width, uint32_t height)
 
 // The same of consistency graphs; COLMAP also lists pixels that no view is consistent with, which
 // we read but do not write.
-void graphs_are_the_same_both_ways(uint32_t width, uint32_t height)
-{
+void graphs_are_the_same_both_ways(uint32_t width, uint32_t height) {
     std::printf("consistency graphs of %u x %u\n", width, height);
     const std::string folder = scene::empty_folder("maps-graphs");
     const std::string ours = folder + "/ours.bin", theirs = folder + "/theirs.bin";
@@ -228,8 +221,7 @@ void graphs_are_the_same_both_ways(uint32_t width, uint32_t height)
 }
 
 // COLMAP reads our cloud, and writes the same two files of it.
-void the_cloud_is_the_same(const scene::Workspace &workspace)
-{
+void the_cloud_is_the_same(const scene::Workspace &workspace) {
     std::printf("the cloud\n");
     size_t count = 0, view_total = 0;
     must(skep_cloud_get_count(workspace.cloud.get(), &count, &view_total));
@@ -273,8 +265,7 @@ void the_cloud_is_the_same(const scene::Workspace &workspace)
 
 } // namespace
 
-int main()
-{
+int main() {
     std::setvbuf(stdout, nullptr, _IOLBF, 0);
     try {
         const scene::Workspace workspace =

@@ -16,15 +16,13 @@ const double ball_radius = 0.6;
 const Vector box_low = {-1.2, -0.3, 3.7};
 const Vector box_high = {-0.3, 0.6, 4.5};
 
-Vector plus(const Vector &a, const Vector &b, double factor)
-{
+Vector plus(const Vector &a, const Vector &b, double factor) {
     return {a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]};
 }
 
 double dot(const Vector &a, const Vector &b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-Vector cross(const Vector &a, const Vector &b)
-{
+Vector cross(const Vector &a, const Vector &b) {
     return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
@@ -32,8 +30,7 @@ Vector unit(const Vector &a) { return plus({0, 0, 0}, a, 1 / std::sqrt(dot(a, a)
 
 // How far along a ray, in multiples of its direction, the first surface is; the wall ends every
 // ray.
-double first_hit(const Vector &from, const Vector &direction)
-{
+double first_hit(const Vector &from, const Vector &direction) {
     double nearest = (wall_distance - dot(wall_normal, from)) / dot(wall_normal, direction);
 
     const Vector to_ball = plus(ball_center, from, -1);
@@ -55,8 +52,7 @@ double first_hit(const Vector &from, const Vector &direction)
 }
 
 // A number in [0, 1) for a corner of the grid.
-double corner(int x, int y, int z, uint32_t seed)
-{
+double corner(int x, int y, int z, uint32_t seed) {
     uint32_t hash = seed * 0x9E3779B9u;
     for (int coordinate : {x, y, z}) {
         hash = (hash ^ static_cast<uint32_t>(coordinate)) * 0x85EBCA6Bu;
@@ -66,8 +62,7 @@ double corner(int x, int y, int z, uint32_t seed)
 }
 
 // Random values at the corners of a cubic grid, blended in between.
-double noise(const Vector &point, double cell, uint32_t seed)
-{
+double noise(const Vector &point, double cell, uint32_t seed) {
     int base[3];
     double part[3];
     for (int axis = 0; axis < 3; ++axis) {
@@ -87,15 +82,13 @@ double noise(const Vector &point, double cell, uint32_t seed)
     return sum;
 }
 
-double brightness(const Vector &point, uint32_t channel)
-{
+double brightness(const Vector &point, uint32_t channel) {
     return 0.4 * noise(point, 0.07, 1) + 0.3 * noise(point, 0.15, 2) +
            0.3 * noise(point, 0.4, 3 + channel);
 }
 
 // The direction, in the world, in which a camera sees a pixel; its depth is 1.
-Vector ray(const skep_camera &camera, double x, double y)
-{
+Vector ray(const skep_camera &camera, double x, double y) {
     const Vector seen = {(x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1};
     Vector direction;
     for (int axis = 0; axis < 3; ++axis) {
@@ -106,8 +99,7 @@ Vector ray(const skep_camera &camera, double x, double y)
 }
 
 // A camera at a place that looks at another, upright but for a small turn about its axis.
-skep_camera look(const Vector &from, const Vector &at, double turn)
-{
+skep_camera look_at(const Vector &from, const Vector &at, double turn) {
     const Vector forward = unit(plus(at, from, -1));
     const Vector right = unit(cross({std::sin(turn), std::cos(turn), 0}, forward));
     const Vector rows[3] = {right, cross(forward, right), forward};
@@ -119,8 +111,7 @@ skep_camera look(const Vector &from, const Vector &at, double turn)
     return camera;
 }
 
-void photograph(View &view)
-{
+void photograph(View &view) {
     const Vector from = center(view.camera);
     const int grid = 3;
     view.rgb.clear();
@@ -142,8 +133,7 @@ void photograph(View &view)
     }
 }
 
-bool sees(const View &view, const Vector &point)
-{
+bool sees(const View &view, const Vector &point) {
     const Vector pixel = project(view.camera, point), from = center(view.camera);
     const bool inside =
         pixel[0] >= 0 && pixel[1] >= 0 && pixel[0] <= view.width - 1 && pixel[1] <= view.height - 1;
@@ -152,8 +142,7 @@ bool sees(const View &view, const Vector &point)
 
 } // namespace
 
-Vector center(const skep_camera &camera)
-{
+Vector center(const skep_camera &camera) {
     Vector place;
     for (int axis = 0; axis < 3; ++axis) {
         place[axis] = 0;
@@ -164,8 +153,7 @@ Vector center(const skep_camera &camera)
     return place;
 }
 
-Vector project(const skep_camera &camera, const Vector &point)
-{
+Vector project(const skep_camera &camera, const Vector &point) {
     Vector seen;
     for (int row = 0; row < 3; ++row) {
         const double *turn = camera.rotation + 3 * row;
@@ -175,8 +163,7 @@ Vector project(const skep_camera &camera, const Vector &point)
             seen[2]};
 }
 
-double distance_to_surface(const Vector &point)
-{
+double distance_to_surface(const Vector &point) {
     const double wall = std::abs(dot(wall_normal, point) - wall_distance);
     const Vector from_ball = plus(point, ball_center, -1);
     const double ball = std::abs(std::sqrt(dot(from_ball, from_ball)) - ball_radius);
@@ -190,8 +177,7 @@ double distance_to_surface(const Vector &point)
     return std::min({wall, ball, box});
 }
 
-Scene make()
-{
+Scene make() {
     Scene scene;
     for (uint32_t index = 0; index < 6; ++index) {
         const double column = index % 3 - 1.0, row = index / 3 - 0.5;
@@ -201,8 +187,8 @@ Scene make()
         // Sizes, focal lengths and principal points differ, so that none can stand in for another.
         view.width = index == 4 ? 148 : 160;
         view.height = index == 4 ? 128 : 120;
-        view.camera =
-            look({0.55 * column, 0.6 * row, 0.05 * column}, {0.1 * column, 0, 4.5}, 0.05 * column);
+        view.camera = look_at({0.55 * column, 0.6 * row, 0.05 * column}, {0.1 * column, 0, 4.5},
+                              0.05 * column);
         view.camera.fx = 150.5;
         view.camera.fy = 152.25;
         view.camera.cx = view.width / 2.0 - 1.75;
@@ -231,8 +217,7 @@ Scene make()
     return scene;
 }
 
-check::Owned<skep_scene> hand_over(const Scene &made)
-{
+check::Owned<skep_scene> hand_over(const Scene &made) {
     skep_scene *handle = nullptr;
     check::must(skep_scene_create(&handle));
     check::Owned<skep_scene> scene(handle, skep_scene_destroy);
@@ -250,8 +235,7 @@ check::Owned<skep_scene> hand_over(const Scene &made)
     return scene;
 }
 
-Workspace reconstruct_into(const std::string &folder)
-{
+Workspace reconstruct_into(const std::string &folder) {
     Scene made = make();
     check::Owned<skep_scene> scene = hand_over(made);
     skep_result *result = nullptr;
@@ -266,8 +250,7 @@ Workspace reconstruct_into(const std::string &folder)
             folder};
 }
 
-std::string empty_folder(const std::string &name)
-{
+std::string empty_folder(const std::string &name) {
     const std::filesystem::path folder = std::filesystem::absolute(name);
     std::filesystem::remove_all(folder);
     std::filesystem::create_directories(folder);

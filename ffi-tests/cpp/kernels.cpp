@@ -31,16 +31,17 @@ void test_kernels() {
         CHECK(std::abs(world::center(source)[i] + farther * at_source[i] - point) < 1e-9);
     }
 
-    const auto look = [](const std::vector<std::uint8_t> &pixels) {
+    const auto image = [](const std::vector<std::uint8_t> &pixels) {
         return skep_image{pixels.data(), world::width, world::height, world::width,
                           SKEP_FORMAT_GRAY};
     };
     const auto reference_picture = world::picture(reference, world::width, world::height);
     const auto source_picture = world::picture(source, world::width, world::height);
-    const skep::Samples reference_samples = MUST(skep::Samples::create(look(reference_picture)));
-    const skep::Samples source_samples = MUST(skep::Samples::create(look(source_picture)));
+    const skep::PackedImage reference_samples =
+        MUST(skep::PackedImage::create(image(reference_picture)));
+    const skep::PackedImage source_samples = MUST(skep::PackedImage::create(image(source_picture)));
     const double all_alike = std::numeric_limits<double>::infinity();
-    const skep::Window window = MUST(skep::Window::create(5, 1, all_alike, all_alike));
+    const skep::NccWindow window = MUST(skep::NccWindow::create(5, 1, all_alike, all_alike));
     const skep::Homography identity = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     const std::vector<skep::Pixel> pixels = {{20, 17}, {20, 17}};
     const skep::Homography shift = {1, 0, 4, 0, 1, 0, 0, 0, 1};
@@ -56,7 +57,7 @@ void test_kernels() {
     FAILS(
         SKEP_ERR_ARGUMENT, "2 as the pixels",
         skep::patch_ncc(window, reference_samples, source_samples, pixels, ways, {ncc.data(), 1}));
-    FAILS(SKEP_ERR_ARGUMENT, "radius", skep::Window::create(99, 1, 1, 1));
+    FAILS(SKEP_ERR_ARGUMENT, "radius", skep::NccWindow::create(99, 1, 1, 1));
     FAILS(SKEP_ERR_ARGUMENT, "depth is -2",
           skep::plane_through(reference, 1, 1, -2, world::Vector{0, 0, -1}));
     FAILS(SKEP_ERR_ARGUMENT, "normal is 2 long; expected 3",

@@ -5,7 +5,8 @@
 #include <cstdio>
 
 int main(int argc, char **argv) {
-    if (argc != 2) return std::fputs("usage: program FOLDER\n", stderr), 2;
+    if (argc != 2)
+        return std::fputs("usage: program FOLDER\n", stderr), 2;
     const std::string folder = argv[1];
     test_library();
     test_spans();
@@ -15,7 +16,7 @@ int main(int argc, char **argv) {
     test_run(folder);
     test_progress();
     test_stepper_equal_whole();
-    test_states();
+    test_estimates();
     test_kernels();
     test_files(folder);
 }

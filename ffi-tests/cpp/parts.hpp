@@ -19,6 +19,6 @@ void test_moves();
 void test_run(const std::string &folder);
 void test_progress();
 void test_stepper_equal_whole();
-void test_states();
+void test_estimates();
 void test_kernels();
 void test_files(const std::string &folder);

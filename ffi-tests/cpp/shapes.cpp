@@ -89,15 +89,15 @@ static void test_pictures() {
     const cv::Mat part =
         wide(cv::Rect(int(world::width), 0, int(world::width), int(world::height)));
 
-    const skep::Window window = MUST(skep::Window::create(5, 2, 3, 0.1));
-    const skep::Samples reference = MUST(skep::Samples::create(gray));
+    const skep::NccWindow window = MUST(skep::NccWindow::create(5, 2, 3, 0.1));
+    const skep::PackedImage reference = MUST(skep::PackedImage::create(gray));
     const std::vector<skep::Pixel> pixel = {{20, 17}};
     const std::vector<skep::Homography> shift = {{1, 0, 1.25, 0, 1, 0.5, 0, 0, 1}};
     std::vector<float> expected(1), ncc(1);
     MUST(skep::patch_ncc(window, reference, reference, pixel, shift, expected));
     CHECK(expected[0] < 0.999f);
     for (const cv::Mat &picture : {bgr, bgra, deep, real, part}) {
-        const skep::Samples source = MUST(skep::Samples::create(picture));
+        const skep::PackedImage source = MUST(skep::PackedImage::create(picture));
         MUST(skep::patch_ncc(window, reference, source, pixel, shift, ncc));
         CHECK(ncc[0] == expected[0]);
     }
@@ -107,7 +107,7 @@ static void test_pictures() {
     CHECK(MUST(skep::image(bgra, skep::Order::Rgb)).format == SKEP_FORMAT_RGBA);
     CHECK(MUST(skep::image(part)).stride_bytes == 2 * world::width);
     FAILS(SKEP_ERR_ARGUMENT, "picture", skep::image(cv::Mat()));
-    FAILS(SKEP_ERR_ARGUMENT, "picture", skep::Samples::create(cv::Mat(9, 9, CV_64F)));
+    FAILS(SKEP_ERR_ARGUMENT, "picture", skep::PackedImage::create(cv::Mat(9, 9, CV_64F)));
 }
 
 static void test_maps(const std::string &folder) {
@@ -124,8 +124,7 @@ static void test_maps(const std::string &folder) {
     MUST(scene.set_mask(0, mask));
     FAILS(SKEP_ERR_ARGUMENT, "mask", scene.set_mask(0, cv::Mat(5, 5, CV_8U)));
     skep::Options options = MUST(skep::Options::create());
-    const skep_scale scale = {0, 3, 3, 0, 1};
-    MUST(options.set_scales(skep::Span<const skep_scale>(&scale, 1)));
+    MUST(options.set("schedule.scales", "downscale=1 food_sources=3 iterations=3+0x1"));
     const skep::Result result = MUST(skep::reconstruct(scene, options));
 
     const skep::Map<float> own_depth = MUST(result.depth(0, skep::Maps::Raw));
@@ -154,8 +153,8 @@ static void test_maps(const std::string &folder) {
     MUST(skep::write_depth_map(folder + "/depth.bin", depth));
     CHECK(MUST(skep::read_depth_map(folder + "/depth.bin")).data == own_depth.data);
     const skep::FusionView view = {MUST(scene.camera(0)),
-                                   MUST(skep::look<float>(depth)),
-                                   MUST(skep::look<float>(normal, 3)),
+                                   MUST(skep::map_view<float>(depth)),
+                                   MUST(skep::map_view<float>(normal, 3)),
                                    {},
                                    std::nullopt};
     MUST(options.set("fusion.min_views", 0));
@@ -163,9 +162,10 @@ static void test_maps(const std::string &folder) {
         MUST(skep::fuse(skep::Span<const skep::FusionView>(&view, 1), options));
     CHECK(MUST(cloud.size()) == std::size_t(cv::countNonZero(depth)));
     const skep::Stepper stepper = MUST(skep::Stepper::create(scene, options));
-    const skep::Estimate estimate = MUST(stepper.state_from_maps(0, 0, depth, normal, mask, cost));
+    const skep::Estimate estimate =
+        MUST(stepper.estimate_from_maps(0, 0, depth, normal, mask, cost));
     CHECK(MUST(estimate.maps()).depth == own_depth.data);
-    FAILS(SKEP_ERR_ARGUMENT, "depth", stepper.state_from_maps(0, 0, status, normal));
+    FAILS(SKEP_ERR_ARGUMENT, "depth", stepper.estimate_from_maps(0, 0, status, normal));
 }
 
 int main(int argc, char **argv) {

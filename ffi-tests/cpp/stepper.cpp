@@ -2,28 +2,28 @@
 #include "parts.hpp"
 #include "test.hpp"
 
-/// Takes all stepper of all views by hand, as skep.h describes it.
-static std::vector<skep::Estimate> take_all_stepper(const skep::Stepper &stepper) {
+/// Runs all cycles of all views, as skep.h describes it.
+static std::vector<skep::Estimate> run_all_cycles(const skep::Stepper &stepper) {
     const std::uint32_t views = MUST(stepper.view_count());
     std::vector<skep::Estimate> estimates(views);
-    std::optional<std::uint32_t> step = 0;
-    while (step) {
+    std::optional<std::uint32_t> cycle = 0;
+    while (cycle) {
         const std::uint32_t pixels = [&] {
-            const skep::Size size = MUST(stepper.size(*step, 0));
+            const skep::Size size = MUST(stepper.size(*cycle, 0));
             return size.width * size.height;
         }();
         for (std::uint32_t view = 0; view < views; ++view)
             if (estimates[view] && MUST(estimates[view].info()).pixels < pixels)
-                estimates[view] = MUST(stepper.upsample(*step, view, estimates[view]));
+                estimates[view] = MUST(stepper.upsample(*cycle, view, estimates[view]));
         std::vector<skep::Estimate> found(views), checked(views);
         for (std::uint32_t view = 0; view < views; ++view) {
-            const skep::Candidates candidates = MUST(stepper.propagate(*step, view, estimates));
-            found[view] = MUST(stepper.search(*step, view, estimates, candidates));
+            const skep::Candidates candidates = MUST(stepper.propagate(*cycle, view, estimates));
+            found[view] = MUST(stepper.search(*cycle, view, estimates, candidates));
         }
         for (std::uint32_t view = 0; view < views; ++view)
-            checked[view] = MUST(stepper.check(*step, view, found));
+            checked[view] = MUST(stepper.check(*cycle, view, found));
         estimates = std::move(checked);
-        step = MUST(stepper.next(*step, estimates));
+        cycle = MUST(stepper.next(*cycle, estimates));
     }
     return estimates;
 }
@@ -33,10 +33,10 @@ void test_stepper_equal_whole() {
     const skep::Options options = quick_options();
     const skep::Result whole = MUST(skep::reconstruct(scene, options));
     const skep::Stepper stepper = MUST(skep::Stepper::create(scene, options));
-    CHECK(MUST(stepper.step_count()) == 6 && MUST(stepper.step(0)).downscale == 2);
+    CHECK(MUST(stepper.cycle_count()) == 6 && MUST(stepper.cycle(0)).downscale == 2);
     CHECK(MUST(stepper.sources(0)) == MUST(whole.sources(0)));
 
-    const std::vector<skep::Estimate> estimates = take_all_stepper(stepper);
+    const std::vector<skep::Estimate> estimates = run_all_cycles(stepper);
     std::vector<skep::Result> parts;
     for (std::uint32_t view = 0; view < 5; ++view) {
         parts.push_back(MUST(stepper.finish(view, estimates)));
@@ -60,8 +60,8 @@ void test_stepper_equal_whole() {
         normals.push_back(MUST(parts[view].normal(view, skep::Maps::Validated)));
         const skep_camera camera = MUST(scene.camera(view));
         pictures.push_back(world::picture(camera, world::width, world::height));
-        views.push_back({camera, MUST(skep::look<float>(depths.back())),
-                         MUST(skep::look<float>(normals.back(), 3)), MUST(scene.overlap(view)),
+        views.push_back({camera, MUST(skep::map_view<float>(depths.back())),
+                         MUST(skep::map_view<float>(normals.back(), 3)), MUST(scene.overlap(view)),
                          skep_image{pictures.back().data(), world::width, world::height,
                                     world::width, SKEP_FORMAT_GRAY}});
     }
@@ -76,7 +76,7 @@ void test_stepper_equal_whole() {
     FAILS(SKEP_ERR_ARGUMENT, "views[2].normal is 55 x 42", skep::fuse(views, options));
 }
 
-void test_states() {
+void test_estimates() {
     const skep::Stepper stepper = MUST(skep::Stepper::create(made_scene(), quick_options()));
     const std::vector<skep::Estimate> none(5);
     const skep::Estimate found = MUST(stepper.search(0, 2, none));
@@ -86,7 +86,7 @@ void test_states() {
     FAILS(SKEP_ERR_NULL, "estimate", none[0].info());
     FAILS(SKEP_ERR_CANCELLED, "",
           stepper.search(0, 2, none, skep::Candidates(),
-                       [](const skep::Progress &) { return skep::Flow::Cancel; }));
+                         [](const skep::Progress &) { return skep::Flow::Cancel; }));
 
     // As bytes and back: the same maps.
     const std::vector<std::uint8_t> bytes = MUST(found.save());
@@ -102,15 +102,15 @@ void test_states() {
     depth.at(3, 2) = 5, normal.at(3, 2, 2) = -1;
     depth.at(4, 2) = 6, normal.at(4, 2, 2) = -1;
     const std::size_t place = 2 * 28 + 3;
-    const skep::Estimate given = MUST(stepper.state_from_maps(0, 2, depth, normal));
+    const skep::Estimate given = MUST(stepper.estimate_from_maps(0, 2, depth, normal));
     const skep::Estimate::Content content = MUST(given.maps());
     CHECK(MUST(given.info()).is_checked == 1 && MUST(given.info()).validated == 2);
     CHECK(content.depth[place] == 5 && content.depth[place + 2] == 0);
     skep::Map<std::uint8_t> validated(size);
     validated.at(4, 2) = 1;
-    const skep::Estimate doubted = MUST(stepper.state_from_maps(0, 2, depth, normal, validated));
+    const skep::Estimate doubted = MUST(stepper.estimate_from_maps(0, 2, depth, normal, validated));
     CHECK(MUST(doubted.maps()).validated[place] == 0 && MUST(doubted.info()).validated == 1);
-    FAILS(SKEP_ERR_ARGUMENT, "normal", stepper.state_from_maps(0, 2, depth, depth));
+    FAILS(SKEP_ERR_ARGUMENT, "normal", stepper.estimate_from_maps(0, 2, depth, depth));
     FAILS(SKEP_ERR_ARGUMENT, "28 x 21",
-          stepper.state_from_maps(0, 2, skep::Map<float>({9, 9}), normal));
+          stepper.estimate_from_maps(0, 2, skep::Map<float>({9, 9}), normal));
 }

@@ -20,16 +20,16 @@ skep::Scene made_scene() {
 
 skep::Options quick_options() {
     skep::Options options = MUST(skep::Options::create());
-    const skep_scale scales[] = {{1, 4, 4, 2, 1}, {0, 3, 2, 2, 1}};
-    MUST(options.set_scales(scales));
-    MUST(options.set("stop_share", 0));
+    MUST(options.set("schedule.scales", "downscale=2 food_sources=4 iterations=4+2x1; "
+                                        "downscale=1 food_sources=3 iterations=2+2x1"));
+    MUST(options.set("min_changed_fraction", 0));
     return options;
 }
 
 void test_library() {
     CHECK(skep::abi_matches());
     CHECK(std::string(skep::version()).find('.') != std::string::npos);
-    CHECK(!std::string(skep::backend_name()).empty());
+    CHECK(!std::string(skep::simd_level_name()).empty());
 }
 
 void test_spans() {
@@ -51,18 +51,22 @@ void test_options() {
     skep::Options options = MUST(skep::Options::create());
     MUST(options.set("threads", 2));
     CHECK(MUST(options.get("threads")) == 2);
-    MUST(options.set_seed(std::uint64_t(1) << 63));
-    MUST(options.set_simd("scalar"));
-    MUST(options.set_simd(nullptr));
-    const std::vector<std::string> names = skep::Options::names();
-    CHECK(names.size() > 10 && names.front() == "threads");
-    for (const std::string &name : names)
-        MUST(options.get(name.c_str()));
-    const std::vector<skep_scale> scales = MUST(quick_options().scales());
-    CHECK(scales.size() == 2 && scales[0].halvings == 1 && scales[1].foods == 3);
+    MUST(options.set("seed", std::to_string(std::uint64_t(1) << 63)));
+    CHECK(MUST(options.text("seed")) == "9223372036854775808");
+    MUST(options.set("simd", "scalar"));
+    MUST(options.set("view_propagation", false));
+    CHECK(MUST(options.text("search.view_propagation")) == "false");
+    CHECK(MUST(quick_options().text("scales")) == "downscale=2 food_sources=4 iterations=4+2x1; "
+                                                  "downscale=1 food_sources=3 iterations=2+2x1");
+    // All options can be copied by their texts.
+    skep::Options copy = MUST(skep::Options::create("paper"));
+    for (const std::string &name : skep::Options::names())
+        MUST(copy.set(name.c_str(), MUST(options.text(name.c_str()))));
+    CHECK(MUST(copy.get("threads")) == 2 && MUST(copy.text("simd")) == "scalar");
 
     FAILS(SKEP_ERR_ARGUMENT, "thread", options.set("thread", 1));
-    FAILS(SKEP_ERR_ARGUMENT, "stop_share", options.set("stop_share", 2));
+    FAILS(SKEP_ERR_ARGUMENT, "simd", options.get("simd"));
+    FAILS(SKEP_ERR_ARGUMENT, "min_changed_fraction", options.set("min_changed_fraction", 2));
     FAILS(SKEP_ERR_ARGUMENT, "quick", skep::Options::create("quick"));
     CHECK(MUST(options.get("threads")) == 2);
 }
@@ -160,7 +164,8 @@ void test_run(const std::string &folder) {
     std::uint64_t validated = 0;
     for (std::uint8_t value : status.data)
         validated += value == SKEP_PIXEL_VALIDATED;
-    CHECK(statistics.status_counts[SKEP_PIXEL_VALIDATED] == validated && statistics.ncc_evaluations > 0);
+    CHECK(statistics.status_counts[SKEP_PIXEL_VALIDATED] == validated &&
+          statistics.ncc_evaluations > 0);
     CHECK(MUST(result.cycles(0)).size() == 6 && MUST(result.sources(0)).size() == 4);
     std::uint32_t bits = MUST(result.source_bits(0, 0)).at(28, 21);
     int count = 0;
@@ -195,7 +200,9 @@ void test_progress() {
               return skep::Flow::Cancel;
           }));
     int calls = 0;
-    const skep::Watch watch = [&](const skep::Progress &) { return ++calls, skep::Flow::Continue; };
+    const skep::ProgressCallback watch = [&](const skep::Progress &) {
+        return ++calls, skep::Flow::Continue;
+    };
     CHECK(MUST(skep::reconstruct(scene, options, watch)) && calls > 0);
 #ifndef SKEP_NO_EXCEPTIONS
     // The exception goes through the library to whom called it, once, and the run ends early.
@@ -215,7 +222,8 @@ void test_progress() {
     // At the end too, when the result is there already.
     try {
         skep::reconstruct(scene, options, [](const skep::Progress &progress) {
-            if (progress.done >= 1) throw 7;
+            if (progress.done >= 1)
+                throw 7;
         });
         CHECK(false);
     } catch (int seven) {

@@ -4,14 +4,13 @@
 #include <skep.h>
 
 /* Macros as a program uses them: their values have to fit where they go, without casts. */
-skep_status use_macros(
-    skep_image *image, uint32_t step, const skep_statistics *statistics, skep_status before);
+skep_status use_macros(skep_image *image, uint32_t cycle, const skep_statistics *statistics,
+                       skep_status before);
 
-skep_status use_macros(
-    skep_image *image, uint32_t step, const skep_statistics *statistics, skep_status before)
-{
+skep_status use_macros(skep_image *image, uint32_t cycle, const skep_statistics *statistics,
+                       skep_status before) {
     image->format = SKEP_FORMAT_BGR + SKEP_FORMAT_16;
-    if (step == SKEP_CYCLE_NONE || statistics->status_counts[SKEP_PIXEL_MASKED] > 0) {
+    if (cycle == SKEP_CYCLE_NONE || statistics->status_counts[SKEP_PIXEL_MASKED] > 0) {
         return SKEP_OK;
     }
     switch (before) {

@@ -92,7 +92,8 @@ static void test_against_warp() {
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
             const cv::Point2d at = apply(h, x, y);
-            if (at.x < 1 || at.y < 1 || at.x > width - 2 || at.y > height - 2) continue;
+            if (at.x < 1 || at.y < 1 || at.x > width - 2 || at.y > height - 2)
+                continue;
             const int gray = warped.at<std::uint8_t>(y, x),
                       truth = reference_pixels[std::size_t(y * width + x)];
             const double difference = std::abs(gray - sample(seen, at));

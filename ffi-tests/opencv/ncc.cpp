@@ -18,17 +18,19 @@ static skep::Homography random_homography(cv::RNG &random, const skep::Pixel &pi
 }
 
 struct Differences {
-    double from_exact = 0, mean_from_exact = 0, from_opencv = 0, mean_from_opencv = 0, largest_bound = 0;
+    double from_exact = 0, mean_from_exact = 0, from_opencv = 0, mean_from_opencv = 0,
+           largest_bound = 0;
 };
 
 static Differences compare(const cv::Mat &reference, const cv::Mat &source, int step,
                            const std::vector<skep::Pixel> &pixels,
                            const std::vector<skep::Homography> &homographies) {
     const double alike = std::numeric_limits<double>::infinity();
-    const skep::Window window = skep::Window::create(radius, std::uint32_t(step), alike, alike);
+    const skep::NccWindow window =
+        skep::NccWindow::create(radius, std::uint32_t(step), alike, alike);
     std::vector<float> ncc(pixels.size());
-    skep::patch_ncc(window, skep::Samples::create(reference), skep::Samples::create(source), pixels,
-                    homographies, ncc);
+    skep::patch_ncc(window, skep::PackedImage::create(reference), skep::PackedImage::create(source),
+                    pixels, homographies, ncc);
 
     const int side = 2 * radius / step + 1;
     cv::Mat real_source, patch(side, side, CV_32F), map_x = patch.clone(), map_y = patch.clone(),
@@ -87,11 +89,12 @@ int main() {
     }
     for (int step : {1, 2}) {
         const Differences found = compare(reference, source, step, pixels, homographies);
-        std::printf("ncc, step %d: from doubles %.1e in the mean, %.1e at most; from OpenCV %.1e in "
-                    "the mean, %.1e at most, where "
-                    "rounding places to 1/32 px allows up to %.1e\n",
-                    step, found.mean_from_exact, found.from_exact, found.mean_from_opencv,
-                    found.from_opencv, found.largest_bound);
+        std::printf(
+            "ncc, step %d: from doubles %.1e in the mean, %.1e at most; from OpenCV %.1e in "
+            "the mean, %.1e at most, where "
+            "rounding places to 1/32 px allows up to %.1e\n",
+            step, found.mean_from_exact, found.from_exact, found.mean_from_opencv,
+            found.from_opencv, found.largest_bound);
         CHECK(found.mean_from_exact < 2e-4);
         CHECK(found.mean_from_opencv < 2e-3);
     }

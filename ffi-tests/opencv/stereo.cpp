@@ -39,7 +39,7 @@ struct Hit {
 
 /// What a ray meets first, from (x, 0, 0) towards (a, b, 1): a back wall, a floor, a slanted board
 /// and two balls.
-static Hit look(double x, double a, double b) {
+static Hit cast(double x, double a, double b) {
     Hit hit;
     const auto plane = [&](int surface, cv::Vec3d normal, double offset, auto inside) {
         const double depth = (offset - normal[0] * x) / (normal[0] * a + normal[1] * b + normal[2]);
@@ -51,7 +51,8 @@ static Hit look(double x, double a, double b) {
         const cv::Vec3d ray(a, b, 1), from(x - center[0], -center[1], -center[2]);
         const double half = ray.dot(from) / ray.dot(ray);
         const double root = half * half - (from.dot(from) - radius * radius) / ray.dot(ray);
-        if (root < 0 || -half - std::sqrt(root) >= hit.depth) return;
+        if (root < 0 || -half - std::sqrt(root) >= hit.depth)
+            return;
         const double depth = -half - std::sqrt(root);
         hit = {depth, gray(from[0] + depth * a, from[1] + depth * b, surface)};
     };
@@ -73,7 +74,7 @@ static cv::Mat photograph(double x, std::uint64_t number) {
             double sum = 0;
             for (double dy : {-0.25, 0.25})
                 for (double dx : {-0.25, 0.25})
-                    sum += look(x, (column + dx - cx) / focal, (row + dy - cy) / focal).gray;
+                    sum += cast(x, (column + dx - cx) / focal, (row + dy - cy) / focal).gray;
             out.at<float>(row, column) = float(sum / 4);
         }
     }
@@ -89,10 +90,10 @@ static cv::Mat true_disparities() {
     for (int row = 0; row < height; ++row) {
         for (int column = 0; column < width; ++column) {
             const double b = (row - cy) / focal;
-            const double disparity = focal * baseline / look(0, (column - cx) / focal, b).depth;
+            const double disparity = focal * baseline / cast(0, (column - cx) / focal, b).depth;
             const double there = column - disparity;
             const double seen =
-                look(baseline, (there - cx) / focal, b).depth * disparity / (focal * baseline);
+                cast(baseline, (there - cx) / focal, b).depth * disparity / (focal * baseline);
             if (there >= 0 && std::abs(seen - 1) < 1e-3)
                 out.at<float>(row, column) = float(disparity);
         }
@@ -115,10 +116,12 @@ static Scores score(const cv::Mat &truth, const cv::Mat &disparity, const cv::Ma
         for (int column = 0; column < width; ++column) {
             const float right = truth.at<float>(row, column),
                         found = disparity.at<float>(row, column);
-            if (right == 0) continue;
+            if (right == 0)
+                continue;
             const double error = std::abs(found - right);
             ++all, scores.off_or_none += found <= 0 || error > 1;
-            if (found <= 0 || other.at<float>(row, column) <= 0) continue;
+            if (found <= 0 || other.at<float>(row, column) <= 0)
+                continue;
             ++both, scores.mean += error, scores.off += error > 1;
         }
     }
@@ -138,12 +141,12 @@ static std::array<cv::Mat, 2> our_disparities(const cv::Mat &left, const cv::Mat
         scene.set_depth_range(number, {focal * baseline / most_disparity, focal * baseline / 4});
     }
     skep::Options options;
-    options.set("min_consistent", 1); // a pair has one source
+    options.set("min_consistent_views", 1); // a pair has one source
     options.set("fusion.min_views", 1);
     // Near disparity 10 the default tolerance of 1 % is a tenth of a pixel; that much two views are
     // not sure of.
-    options.set("depth_tolerance", 0.02);
-    // A pair has no other views to settle edges: the smaller the window, the fewer of its samples
+    options.set("check.depth_tolerance", 0.02);
+    // A pair has no other views to correct edges: the smaller the window, the fewer of its samples
     // lie beyond them.
     options.set("window_radius", 3);
     options.set("window_step", 1);

@@ -1,4 +1,4 @@
-// Makes a tiny scene for the example in C++, or looks at what the example made of it:
+// Makes a tiny scene for the example in C++, or checks what the example made of it:
 //   program FOLDER [CLOUD PICTURE]
 #include "../cpp/world.hpp"
 #include "pictures.hpp"
@@ -39,7 +39,8 @@ static void check(const std::string &cloud, const std::string &picture) {
     std::ifstream ply(cloud, std::ios::binary);
     std::string line, points;
     while (std::getline(ply, line) && line != "end_header")
-        if (line.rfind("element vertex ", 0) == 0) points = line.substr(15);
+        if (line.rfind("element vertex ", 0) == 0)
+            points = line.substr(15);
     CHECK(line == "end_header" && std::stoi(points) > 500);
     const cv::Mat colors = cv::imread(picture);
     CHECK(colors.cols == int(world::width) && colors.rows == int(world::height));
@@ -50,6 +51,8 @@ static void check(const std::string &cloud, const std::string &picture) {
 
 int main(int argc, char **argv) {
     CHECK(argc == 2 || argc == 4);
-    if (argc == 2) make(argv[1]);
-    else check(argv[2], argv[3]);
+    if (argc == 2)
+        make(argv[1]);
+    else
+        check(argv[2], argv[3]);
 }

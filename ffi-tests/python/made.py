@@ -1,4 +1,4 @@
-"""A world made in code, whose depths and normals are known exactly: a textured ball before a tilted, textured wall."""
+"""A world made in code with known depths and normals: a textured ball before a tilted, textured wall."""
 
 from __future__ import annotations
 
@@ -26,6 +26,10 @@ class Photograph:
     normal: np.ndarray
 
 
+# A run of a fraction of a second.
+TWO_SCALES = "downscale=2 food_sources=3 iterations=2+1x1; downscale=1 food_sources=3 iterations=1+1x1"
+
+
 def camera_at(x: float, y: float) -> skep.Camera:
     """A camera that looks at the world's origin."""
     center = np.array([x, y, -DISTANCE])
@@ -44,7 +48,9 @@ def rays(camera: skep.Camera, columns: np.ndarray, rows: np.ndarray) -> np.ndarr
     return np.stack([x, y, np.ones_like(x)], axis=-1) @ camera.R
 
 
-def cast(camera: skep.Camera, columns: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def cast(
+    camera: skep.Camera, columns: np.ndarray, rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Depth, position and normal in the world of what is seen through pixels."""
     origin, direction = camera.center, rays(camera, columns, rows)
     wall = (-WALL_DISTANCE - origin @ WALL) / (direction @ WALL)
@@ -113,10 +119,12 @@ def scene() -> skep.Scene:
     return made
 
 
-def options(**values: float) -> skep.Options:
+def options(**values: skep._options.Value) -> skep.Options:
     return skep.Options(**{"threads": 2, "fusion_min_views": 2, **values})
 
 
 def slow_options() -> skep.Options:
     """A run of many minutes, to be stopped."""
-    return skep.Options("paper", scales=[(0, 64, 10_000, 0, 0)], threads=2)
+    return skep.Options(
+        "paper", schedule_scales="downscale=1 food_sources=64 iterations=10000+0x0", threads=2
+    )

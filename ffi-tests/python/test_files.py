@@ -62,5 +62,7 @@ def test_a_workspace_holds_the_maps_and_the_cloud(tmp_path, result, scene):
             assert np.array_equal(skep.read_depth_map(tmp_path / "stereo/depth_maps" / name), depth)
             assert np.array_equal(skep.read_normal_map(tmp_path / "stereo/normal_maps" / name), normal)
     ply = (tmp_path / "cloud.ply").read_bytes()
-    assert f"element vertex {len(result.cloud)}".encode() in ply and ply == (tmp_path / "fused.ply").read_bytes()
+    assert (
+        f"element vertex {len(result.cloud)}".encode() in ply and ply == (tmp_path / "fused.ply").read_bytes()
+    )
     assert (tmp_path / "cloud.ply.vis").exists()

@@ -1,4 +1,4 @@
-"""How long calls show where they stand, and how they are stopped."""
+"""Progress and cancellation of long calls."""
 
 import os
 import signal
@@ -20,7 +20,14 @@ def test_progress_comes_in_the_callers_thread_and_grows(scene):
         told.append(progress)
         threads.add(threading.get_ident())
 
-    skep.reconstruct(scene, skep.Options(scales=[(1, 3, 2, 1, 1), (0, 3, 1, 1, 1)], threads=2), progress)
+    skep.reconstruct(
+        scene,
+        skep.Options(
+            schedule_scales=made.TWO_SCALES,
+            threads=2,
+        ),
+        progress,
+    )
     assert threads == {threading.get_ident()}
     done = [progress.done for progress in told]
     assert done == sorted(done) and 0 <= done[0] and done[-1] <= 1
@@ -140,7 +147,7 @@ def test_python_runs_on_while_the_library_works(scene):
 
 
 def test_runs_of_several_threads_give_the_same_bits_and_each_its_own_error(scene):
-    options = skep.Options(scales=[(0, 3, 1, 1, 1)], threads=1)
+    options = skep.Options(schedule_scales="downscale=1 food_sources=3 iterations=1+1x1", threads=1)
     found, failures = {}, {}
 
     def work(number):

@@ -1,4 +1,4 @@
-"""skep and pycolmap: reconstructions go in, workspaces come out, and half a pixel is not lost between them."""
+"""skep and pycolmap: reconstructions in, workspaces out, without losing half a pixel between them."""
 
 import os
 
@@ -75,7 +75,9 @@ def test_half_a_pixel_is_where_pycolmap_has_it(reconstruction):
         camera = made.photographs()[image.image_id - 1].camera
         for point in reconstruction.points3D.values():
             x, y, depth = camera.K @ (camera.R @ point.xyz + camera.t)
-            np.testing.assert_allclose(image.project_point(point.xyz), [x / depth + 0.5, y / depth + 0.5], atol=1e-6)
+            np.testing.assert_allclose(
+                image.project_point(point.xyz), [x / depth + 0.5, y / depth + 0.5], atol=1e-6
+            )
 
 
 def test_pycolmap_fuses_our_workspace(pycolmap, reconstruction, folder, tmp_path):
@@ -86,7 +88,7 @@ def test_pycolmap_fuses_our_workspace(pycolmap, reconstruction, folder, tmp_path
     scene.write_colmap(workspace)
     result.write_workspace(scene, workspace)
     (tmp_path / "fused").mkdir()
-    # Our tolerances. Within 2 pixels, its default, it would merge neighboring pixels of images as small as these.
+    # Our tolerances. Within 2 pixels, its default, it would merge neighboring pixels of such small images.
     options = pycolmap.StereoFusionOptions(
         min_num_pixels=3, max_reproj_error=0.5, max_depth_error=0.01, max_normal_error=30, num_threads=2
     )

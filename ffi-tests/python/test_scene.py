@@ -15,7 +15,9 @@ def test_a_scene_tells_what_it_was_given():
     truth = made.photographs()
     for number, photograph in enumerate(truth):
         assert scene.add_view(photograph.image, photograph.camera, name=f"ü{number}.png") == number
-    assert len(scene) == len(truth) and scene.name(1) == "ü1.png" and scene.size(1) == (made.WIDTH, made.HEIGHT)
+    assert (
+        len(scene) == len(truth) and scene.name(1) == "ü1.png" and scene.size(1) == (made.WIDTH, made.HEIGHT)
+    )
     camera = scene.camera(2)
     for name in ("K", "R", "t", "center"):
         np.testing.assert_allclose(getattr(camera, name), getattr(truth[2].camera, name), rtol=1e-12)
@@ -41,7 +43,7 @@ def test_masked_pixels_have_no_depth_and_say_why():
     mask = np.ones((made.HEIGHT, made.WIDTH + 3), dtype=bool)[:, 3:]
     mask[:30, 10:40] = False
     scene.set_mask(0, mask)
-    options = skep.Options(scales=[(0, 3, 1, 1, 1)])
+    options = skep.Options(scales="downscale=1 food_sources=3 iterations=1+1x1")
     masked = skep.reconstruct(scene, options)[0]
     assert np.array_equal(masked.status == skep.PixelStatus.MASKED, ~mask)
     assert not masked.depth[~mask].any() and masked.depth[mask].all()
@@ -74,7 +76,13 @@ def test_rows_without_gaps_are_read_where_they_are():
     deep, gray = large.astype(np.uint16), large[:, :, 0].copy()
     for there in (large, large[3:9, 4:20], large[::2, 10:], large[:1], deep[5:, 5:], gray):
         assert _images.image(there, "rgb").array.ctypes.data == there.ctypes.data
-    for elsewhere in (large[::-1], large[:, ::2], large[:, :, 0], large.transpose(1, 0, 2), large.astype(">u2")):
+    for elsewhere in (
+        large[::-1],
+        large[:, ::2],
+        large[:, :, 0],
+        large.transpose(1, 0, 2),
+        large.astype(">u2"),
+    ):
         given = _images.image(elsewhere, "rgb")
         assert given.array.flags.c_contiguous and np.array_equal(given.array, elsewhere)
     frozen = large[2:, 2:]
@@ -119,15 +127,35 @@ def test_cameras_are_checked():
 
 def test_options_are_items_and_attributes():
     options = skep.Options(max_sources=6, fusion_min_views=2, seed=5)
-    assert options["max_sources"] == options.max_sources == 6
-    assert options["fusion.min_views"] == options.fusion_min_views == 2
+    assert (
+        options["view_selection.max_sources"]
+        == options.view_selection_max_sources
+        == options["max_sources"]
+        == 6
+    )
+    assert options["fusion.min_views"] == options.fusion_min_views == options.min_views == 2
     options["fusion.min_views"] = 4
-    options.propagation = False
-    assert options.fusion_min_views == 4 and options["propagation"] == 0 and options.seed == 5
-    assert len(options) == len(dict(options)) > 20 and "fusion.min_views" in options and "best_views" in dir(options)
-    assert skep.Options("paper").scales == (skep.Scale(0, 10, 20, 3, 2),) != options.scales
-    options.scales = [skep.Scale(1, 4, 2, 2, 1), (0, 3, 1, 1, 1)]
-    assert options.scales == ((1, 4, 2, 2, 1), (0, 3, 1, 1, 1)) and "seed=5" in repr(options)
+    options.view_propagation = False
+    options.check_depth_tolerance = 0.1 + 0.2
+    assert options.fusion_min_views == 4 and options["search.view_propagation"] is False
+    assert options["check.depth_tolerance"] == 0.1 + 0.2 and options.fusion_depth_tolerance == 0.01
+    assert options == skep.Options(**dict(options)) and len(options) == len(dict(options)) > 20
+    assert "fusion.min_views" in options and "best_views" in options and "best_views" in dir(options)
+    assert "seed" in repr(options)
+
+
+def test_values_of_options_have_types():
+    options = skep.Options("paper", seed=(1 << 64) - 1)
+    assert options.seed == (1 << 64) - 1 and type(options.threads) is int
+    assert type(options.window_sigma_spatial) is float and options.window_sigma_spatial == 5
+    assert options.refine_fill_gaps is False and options.simd == "best"
+    assert options.schedule_scales == options["scales"] == "downscale=1 food_sources=10 iterations=20+3x2"
+    options.scales = (
+        "downscale=2 food_sources=4 iterations=2+2x1; downscale=1 food_sources=3 iterations=1+1x1"
+    )
+    assert options.schedule_scales.startswith("downscale=2 food_sources=4 iterations=2+2x1; ")
+    options.min_consistent_views, options.fill_gaps = np.uint8(3), np.bool_(True)
+    assert options.check_min_consistent_views == 3 and options.refine_fill_gaps is True
 
 
 def test_options_refuse_what_is_none():
@@ -142,10 +170,12 @@ def test_options_refuse_what_is_none():
     for refused in (
         lambda: options.__setitem__("nonsense", 1),
         lambda: options.__setitem__("max_sources", 1.5),
-        lambda: setattr(options, "consistent_share", 2),
-        lambda: setattr(options, "scales", [(1, 4, 2, 2, 1)]),
+        lambda: setattr(options, "min_consistent_fraction", 2),
+        lambda: setattr(options, "scales", "downscale=2 food_sources=4 iterations=2+2x1"),
         lambda: setattr(options, "seed", -1),
-        lambda: options.set_simd("v9"),
+        lambda: setattr(options, "simd", "v9"),
+        lambda: options.__setitem__("depth_tolerance", 0.1),
+        lambda: options.__setitem__("fill_gaps", "yes"),
         lambda: skep.Options("best"),
         lambda: skep.Options(nonsense=1),
     ):

@@ -1,4 +1,4 @@
-"""A run taken apart, and the kernels."""
+"""The stages of a run on single views, and the kernels."""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -7,32 +7,30 @@ import numpy as np
 import pytest
 import skep
 
-SCALES = [(1, 3, 2, 1, 1), (0, 3, 1, 1, 1)]
-
 
 @pytest.fixture(scope="module")
 def options():
-    return skep.Options(threads=2, scales=SCALES, fusion_min_views=2)
+    return skep.Options(threads=2, schedule_scales=made.TWO_SCALES, fusion_min_views=2)
 
 
-def solve(stepper, save=False):
-    """All stepper as their documentation tells, views at the same time; estimates go through bytes when asked."""
+def run_by_hand(stepper, save=False):
+    """All cycles in the documented order, views in parallel; with `save`, estimates go through bytes."""
     views = range(stepper.view_count)
-    estimates, step = [], 0
+    estimates, cycle = [], 0
     with ThreadPoolExecutor(3) as pool:
-        while step is not None:
-            if estimates and stepper[step].downscale != stepper[estimates[0].info.step].downscale:
-                estimates = [stepper.upsample(step, view, estimates[view]) for view in views]
+        while cycle is not None:
+            if estimates and stepper[cycle].downscale != stepper[estimates[0].info.cycle].downscale:
+                estimates = [stepper.upsample(cycle, view, estimates[view]) for view in views]
 
             def search(view):
-                candidates = stepper.propagate(step, view, estimates)
-                return stepper.search(step, view, estimates, candidates)
+                candidates = stepper.propagate(cycle, view, estimates)
+                return stepper.search(cycle, view, estimates, candidates)
 
             searched = list(pool.map(search, views))
-            estimates = list(pool.map(lambda view: stepper.check(step, view, searched), views))
+            estimates = list(pool.map(lambda view: stepper.check(cycle, view, searched), views))
             if save:
                 estimates = [skep.Estimate.load(stepper, estimate.save()) for estimate in estimates]
-            step = stepper.next(step, estimates)
+            cycle = stepper.next(cycle, estimates)
     return estimates
 
 
@@ -40,7 +38,7 @@ def solve(stepper, save=False):
 def test_stepper_give_the_bits_of_a_whole_run(scene, options, save):
     whole = skep.reconstruct(scene, options)
     stepper = skep.Stepper(scene, options)
-    estimates = solve(stepper, save)
+    estimates = run_by_hand(stepper, save)
     for view in range(stepper.view_count):
         part = stepper.finish(view, estimates)
         assert part.view == view and np.array_equal(part.depth, whole[view].depth)
@@ -49,15 +47,18 @@ def test_stepper_give_the_bits_of_a_whole_run(scene, options, save):
         assert part.sources == stepper.sources(view) == whole[view].sources
 
 
-def test_a_state_tells_what_it_is(scene, options):
+def test_an_estimate_knows_its_view_and_its_cycle(scene, options):
     stepper = skep.Stepper(scene, options)
     assert (len(stepper), stepper.view_count) == (4, len(scene))
-    assert stepper[0] == skep.Cycle(downscale=2, cycle=0, foods=3, iterations=2)
-    assert stepper.size(0, 0) == (made.WIDTH // 2, made.HEIGHT // 2) and stepper.size(3, 0) == (made.WIDTH, made.HEIGHT)
+    assert stepper[0] == skep.Cycle(downscale=2, cycle_on_scale=0, food_sources=3, iterations=2)
+    assert stepper.size(0, 0) == (made.WIDTH // 2, made.HEIGHT // 2) and stepper.size(3, 0) == (
+        made.WIDTH,
+        made.HEIGHT,
+    )
     searched = [stepper.search(0, view) for view in range(len(scene))]
     checked = stepper.check(0, 2, searched)
     assert not searched[2].info.is_checked and checked.info.is_checked
-    assert (checked.info.view, checked.info.step, checked.size) == (2, 0, stepper.size(0, 2))
+    assert (checked.info.view, checked.info.cycle, checked.size) == (2, 0, stepper.size(0, 2))
     maps = checked.maps()
     assert maps.depth.shape == maps.validated.shape == (made.HEIGHT // 2, made.WIDTH // 2)
     assert maps.validated.dtype == bool and maps.validated.sum() == checked.info.validated > 0
@@ -69,7 +70,7 @@ def test_a_state_tells_what_it_is(scene, options):
 
 
 def test_a_run_can_start_from_the_hosts_own_maps(scene, options):
-    options["average_views"] = 0
+    options["cross_view_averaging"] = 0
     stepper = skep.Stepper(scene, options)
     last = len(stepper) - 1
     estimates = [
@@ -107,21 +108,26 @@ def test_homographies_carry_points_of_a_plane_from_view_to_view():
 def test_patches_match_best_at_the_true_plane():
     first, second = made.photographs()[:2]
     pixels = np.array([(20, 15), (48, 36), (75, 60)])
-    window, samples = skep.Window(), [skep.PackedImage(photograph.image) for photograph in (first, second)]
-    itself = skep.patch_ncc(window, samples[0], samples[0], pixels, np.tile(np.eye(3), (3, 1, 1)))
+    window, images = skep.NccWindow(), [skep.PackedImage(photograph.image) for photograph in (first, second)]
+    itself = skep.patch_ncc(window, images[0], images[0], pixels, np.tile(np.eye(3), (3, 1, 1)))
     np.testing.assert_allclose(itself, 1, atol=1e-4)
 
     def ncc(factor):
-        normals, depths = first.normal[pixels[:, 1], pixels[:, 0]], first.depth[pixels[:, 1], pixels[:, 0]] * factor
+        normals, depths = (
+            first.normal[pixels[:, 1], pixels[:, 0]],
+            first.depth[pixels[:, 1], pixels[:, 0]] * factor,
+        )
         at = zip(pixels, depths, normals)
         planes = [skep.plane_through(first.camera, x, y, depth, normal) for (x, y), depth, normal in at]
-        return skep.patch_ncc(window, *samples, pixels, skep.plane_homographies(first.camera, second.camera, planes))
+        return skep.patch_ncc(
+            window, *images, pixels, skep.plane_homographies(first.camera, second.camera, planes)
+        )
 
     assert (ncc(1) > 0.9).all() and (ncc(1) > ncc(1.1)).all() and (ncc(1) > ncc(0.9)).all()
-    assert skep.patch_ncc(window, *samples, np.zeros((0, 2), int), np.zeros((0, 3, 3))).shape == (0,)
+    assert skep.patch_ncc(window, *images, np.zeros((0, 2), int), np.zeros((0, 3, 3))).shape == (0,)
     with pytest.raises(skep.ArgumentError, match="pixels has shape"):
-        skep.patch_ncc(window, *samples, pixels[:2], np.zeros((3, 3, 3)))
+        skep.patch_ncc(window, *images, pixels[:2], np.zeros((3, 3, 3)))
     with pytest.raises(skep.ArgumentError, match="pixels"):
-        skep.patch_ncc(window, *samples, [(200, 0)], [np.eye(3)])
+        skep.patch_ncc(window, *images, [(200, 0)], [np.eye(3)])
     with pytest.raises(skep.ArgumentError, match="radius"):
-        skep.Window(radius=0)
+        skep.NccWindow(radius=0)

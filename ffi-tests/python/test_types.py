@@ -18,8 +18,11 @@ image = np.zeros((4, 4, 3), dtype=np.uint8)
 number = scene.add_view(image, skep.Camera(np.eye(3)), order="bgr", depth_range=(1, 2))
 assert_type(number, int)
 options = skep.Options("paper", seed=1, fusion_min_views=2)
-assert_type(options.fusion_min_views, float)
-assert_type(options.scales, tuple[skep.Scale, ...])
+assert_type(options.fusion_min_views, int)
+assert_type(options.check_depth_tolerance, float)
+assert_type(options.schedule_scales, str)
+options.threads = 2
+options.min_views = 3
 
 
 def progress(progress: skep.Progress) -> bool:
@@ -39,7 +42,15 @@ skep.Options("best")  # wrong
 
 
 def mypy(*arguments):
-    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", os.path.join(ROOT, "target/mypy"), *arguments]
+    command = [
+        sys.executable,
+        "-m",
+        "mypy",
+        "--strict",
+        "--cache-dir",
+        os.path.join(ROOT, "target/mypy"),
+        *arguments,
+    ]
     return subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
 
 
@@ -62,4 +73,4 @@ def test_users_are_told_what_is_wrong_and_nothing_else(need, tmp_path):
 def test_everything_public_is_there_and_described():
     for name in skep.__all__:
         assert getattr(skep, name).__doc__, name
-    assert skep.__version__.count(".") == 2 and skep.backend_name() in ("scalar", "base", "v3")
+    assert skep.__version__.count(".") == 2 and skep.simd_level_name() in ("scalar", "baseline", "v3")

@@ -72,7 +72,10 @@ def test_an_array_outlives_the_result():
 
 
 def quick() -> skep.Options:
-    return skep.Options(threads=2, scales=[(1, 3, 2, 1, 1), (0, 3, 1, 1, 1)])
+    return skep.Options(
+        threads=2,
+        schedule_scales=made.TWO_SCALES,
+    )
 
 
 def test_bits_do_not_depend_on_threads_instruction_set_or_array_layout():
@@ -81,9 +84,9 @@ def test_bits_do_not_depend_on_threads_instruction_set_or_array_layout():
         for photograph in made.photographs()[:3]:
             image, order = change(photograph.image)
             scene.add_view(image, photograph.camera, order=order, depth_range=made.DEPTH_RANGE)
-        options = skep.Options(scales=quick().scales, **values)
+        options = skep.Options(schedule_scales=quick().schedule_scales, **values)
         if values["threads"] == 1:
-            options.set_simd("scalar")
+            options.simd = "scalar"
         return [view.depth.tobytes() for view in skep.reconstruct(scene, options)]
 
     def wide(image):
@@ -105,7 +108,11 @@ def test_the_cloud_lies_on_the_surfaces(result):
     cloud = result.cloud
     assert len(cloud) > 3000
     assert cloud.positions.shape == cloud.normals.shape == cloud.colors.shape == (len(cloud), 3)
-    assert (cloud.positions.dtype, cloud.normals.dtype, cloud.colors.dtype) == (np.float64, np.float32, np.uint8)
+    assert (cloud.positions.dtype, cloud.normals.dtype, cloud.colors.dtype) == (
+        np.float64,
+        np.float32,
+        np.uint8,
+    )
     wall = np.abs(cloud.positions @ made.WALL + made.WALL_DISTANCE)
     ball = np.abs(np.linalg.norm(cloud.positions - made.BALL, axis=1) - made.RADIUS)
     assert np.median(np.minimum(wall, ball)) < 0.01
@@ -118,7 +125,11 @@ def test_the_cloud_lies_on_the_surfaces(result):
 def test_fusion_of_a_runs_validated_maps_gives_its_cloud(result, scene):
     views = [
         skep.FusionView(
-            photograph.camera, view.validated_depth, view.validated_normal, photograph.image, scene.overlap(view.view)
+            photograph.camera,
+            view.validated_depth,
+            view.validated_normal,
+            photograph.image,
+            scene.overlap(view.view),
         )
         for photograph, view in zip(made.photographs(), result)
     ]
@@ -127,7 +138,9 @@ def test_fusion_of_a_runs_validated_maps_gives_its_cloud(result, scene):
     assert np.array_equal(cloud.normals, result.cloud.normals)
     assert np.array_equal(cloud.colors, result.cloud.colors)
     assert np.array_equal(cloud.views, result.cloud.views)
-    gray = skep.fuse([skep.FusionView(view.camera, view.depth, view.normal) for view in views], made.options())
+    gray = skep.fuse(
+        [skep.FusionView(view.camera, view.depth, view.normal) for view in views], made.options()
+    )
     assert len(gray) == len(cloud) and (gray.colors == 128).all()
 
 

@@ -16,19 +16,20 @@
 #define SKEP_NO_EXCEPTIONS
 #endif
 
-// Parts of a program that handle errors differently, or speak another C++, may be linked together.
+// Parts of a program that handle errors differently, or are compiled as another C++, may be linked
+// together.
 #if defined(SKEP_NO_EXCEPTIONS) && __cplusplus >= 202002L
-#define SKEP_FLAVOUR expected_20
+#define SKEP_FLAVOR expected_20
 #elif defined(SKEP_NO_EXCEPTIONS)
-#define SKEP_FLAVOUR expected_17
+#define SKEP_FLAVOR expected_17
 #elif __cplusplus >= 202002L
-#define SKEP_FLAVOUR throwing_20
+#define SKEP_FLAVOR throwing_20
 #else
-#define SKEP_FLAVOUR throwing_17
+#define SKEP_FLAVOR throwing_17
 #endif
 
 namespace skep {
-inline namespace SKEP_FLAVOUR {
+inline namespace SKEP_FLAVOR {
 
 /// Why a call failed.
 class Error : public std::exception {
@@ -84,28 +85,30 @@ template <class T> using Fallible = T;
 #endif
 
 namespace detail {
-/// What a call came to, before it is told to the user.
+/// The status and the text of a call, before they become an exception or an Expected.
 struct Status {
     skep_status status = SKEP_OK;
     std::string text;
 
     Status() = default;
     Status(skep_status of_call) : status(of_call) {
-        if (status == SKEP_OK) return;
+        if (status == SKEP_OK)
+            return;
         text.resize(skep_last_error(nullptr, 0));
         skep_last_error(text.data(), text.size());
-        if (!text.empty()) text.pop_back(); // the NUL
+        if (!text.empty())
+            text.pop_back(); // the NUL
     }
     /// Something this header finds, in the words of the library.
     static Status argument(const std::string &name, const std::string &value,
-                            const std::string &expected) {
+                           const std::string &expected) {
         Status status;
         status.status = SKEP_ERR_ARGUMENT;
         status.text = name + " is " + value + "; expected " + expected;
         return status;
     }
     explicit operator bool() const noexcept { return status == SKEP_OK; }
-    /// Goes on with `next` if nothing failed so far.
+    /// Calls `next` unless something failed before.
     template <class Next> Status then(Next next) && {
         return *this ? Status(next()) : std::move(*this);
     }
@@ -113,16 +116,19 @@ struct Status {
 
 #ifdef SKEP_NO_EXCEPTIONS
 template <class T> Fallible<T> give(Status status, T &value) {
-    if (!status) return Error(status.status, std::move(status.text));
+    if (!status)
+        return Error(status.status, std::move(status.text));
     return std::move(value);
 }
 inline Fallible<void> give(Status status) {
-    if (!status) return Error(status.status, std::move(status.text));
+    if (!status)
+        return Error(status.status, std::move(status.text));
     return {};
 }
 #else
 inline void give(Status status) {
-    if (!status) throw Error(status.status, std::move(status.text));
+    if (!status)
+        throw Error(status.status, std::move(status.text));
 }
 template <class T> T give(Status status, T &value) {
     give(std::move(status));
@@ -148,13 +154,14 @@ template <class Call> Status text(std::string &out, Call call) {
     return Status(call(nullptr, 0, &needed)).then([&] {
         out.resize(needed);
         const skep_status status = call(out.data(), out.size(), &needed);
-        if (status == SKEP_OK && !out.empty()) out.pop_back(); // the NUL
+        if (status == SKEP_OK && !out.empty())
+            out.pop_back(); // the NUL
         return status;
     });
 }
 } // namespace detail
 
-} // namespace SKEP_FLAVOUR
+} // namespace SKEP_FLAVOR
 } // namespace skep
 
 #endif // SKEP_ERROR_HPP

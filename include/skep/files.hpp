@@ -5,7 +5,7 @@
 #include "result.hpp"
 
 namespace skep {
-inline namespace SKEP_FLAVOUR {
+inline namespace SKEP_FLAVOR {
 
 /// The views each pixel was matched with.
 struct ConsistencyGraph {
@@ -16,7 +16,7 @@ struct ConsistencyGraph {
 /// Writes a depth map in COLMAP's layout.
 template <class M> Fallible<void> write_depth_map(const std::string &file, const M &depth) {
     MapView<const float> map;
-    return detail::give(detail::look<const float>(depth, 1, "depth", map).then([&] {
+    return detail::give(detail::view_of<const float>(depth, 1, "depth", map).then([&] {
         return skep_write_depth_map(file.c_str(), map.data, map.width, map.height,
                                     map.stride_bytes);
     }));
@@ -25,7 +25,7 @@ template <class M> Fallible<void> write_depth_map(const std::string &file, const
 /// Writes a normal map in COLMAP's layout.
 template <class M> Fallible<void> write_normal_map(const std::string &file, const M &normal) {
     MapView<const float> map;
-    return detail::give(detail::look<const float>(normal, 3, "normal", map).then([&] {
+    return detail::give(detail::view_of<const float>(normal, 3, "normal", map).then([&] {
         return skep_write_normal_map(file.c_str(), map.data, map.width, map.height,
                                      map.stride_bytes);
     }));
@@ -37,7 +37,7 @@ inline Fallible<void> write_consistency_graph(const std::string &file,
     if (counts.size() != std::size_t(graph.size.width) * graph.size.height)
         return detail::give(
             detail::Status::argument("counts", std::to_string(counts.size()) + " long",
-                                      detail::by(graph.size.width, graph.size.height)));
+                                     detail::by(graph.size.width, graph.size.height)));
     return detail::give(skep_write_consistency_graph(file.c_str(), graph.size.width,
                                                      graph.size.height, counts.data(), views.data(),
                                                      views.size()));
@@ -81,7 +81,7 @@ inline Fallible<ConsistencyGraph> read_consistency_graph(const std::string &file
     return detail::give(std::move(status), graph);
 }
 
-} // namespace SKEP_FLAVOUR
+} // namespace SKEP_FLAVOR
 } // namespace skep
 
 #endif // SKEP_FILES_HPP

@@ -6,7 +6,7 @@
 #include "shapes.hpp"
 
 namespace skep {
-inline namespace SKEP_FLAVOUR {
+inline namespace SKEP_FLAVOR {
 
 /// Row by row, so that (x', y', 1) ~ H (x, y, 1).
 using Homography = std::array<double, 9>;
@@ -24,8 +24,10 @@ template <class M> Fallible<Homography> homography(const M &matrix) {
 
 /// Writes a homography into a matrix of Eigen or OpenCV; a cv::Mat becomes one of doubles.
 template <class M> void assign(const Homography &homography, M &matrix) {
-    if constexpr (detail::CanResize<M>::value && detail::IsCalled<M>::value) matrix.resize(3, 3);
-    else if constexpr (detail::CanCreate<M>::value) matrix.create(3, 3, detail::cv_depth<double>());
+    if constexpr (detail::CanResize<M>::value && detail::IsCalled<M>::value)
+        matrix.resize(3, 3);
+    else if constexpr (detail::CanCreate<M>::value)
+        matrix.create(3, 3, detail::cv_depth<double>());
     for (int i = 0; i < 9; ++i) {
         if constexpr (detail::IsCalled<M>::value)
             matrix(i / 3, i % 3) =
@@ -37,7 +39,7 @@ template <class M> void assign(const Homography &homography, M &matrix) {
     }
 }
 
-/// The plane with this unit normal, a vector of three, through the point at `depth` behind a pixel.
+/// The plane with this unit normal, a vector of three, through the point of a pixel at `depth`.
 template <class Normal>
 Fallible<skep_plane> plane_through(const skep_camera &camera, double x, double y, double depth,
                                    const Normal &normal) {
@@ -49,7 +51,7 @@ Fallible<skep_plane> plane_through(const skep_camera &camera, double x, double y
     return detail::give(std::move(status), plane);
 }
 
-/// The homographies that planes induce from pixels of one camera to pixels of another.
+/// The homographies that planes of the reference camera induce from its pixels to the source's.
 inline Fallible<std::vector<Homography>> plane_homographies(const skep_camera &reference,
                                                             const skep_camera &source,
                                                             Span<const skep_plane> planes) {
@@ -60,36 +62,38 @@ inline Fallible<std::vector<Homography>> plane_homographies(const skep_camera &r
 }
 
 /// A gray image in the layout the kernels sample.
-class Samples : public detail::Handle<skep_packed_image, skep_packed_image_destroy> {
+class PackedImage : public detail::Handle<skep_packed_image, skep_packed_image_destroy> {
   public:
     using Handle::Handle;
-    template <class Image> static Fallible<Samples> create(const Image &picture) {
-        Samples samples;
+    template <class Image> static Fallible<PackedImage> create(const Image &picture) {
+        PackedImage packed;
         skep_image image = {};
-        detail::Status status = detail::look_at_image(picture, false, "picture", image).then([&] {
-            return skep_packed_image_create(&image, samples.put());
+        detail::Status status = detail::image_of(picture, false, "picture", image).then([&] {
+            return skep_packed_image_create(&image, packed.put());
         });
-        return detail::give(std::move(status), samples);
+        return detail::give(std::move(status), packed);
     }
 };
 
-/// Where patches are sampled and how samples are weighted.
-class Window : public detail::Handle<skep_ncc_window, skep_ncc_window_destroy> {
+/// The sample positions of a patch and their weights; skep_ncc_window_create explains the
+/// arguments.
+class NccWindow : public detail::Handle<skep_ncc_window, skep_ncc_window_destroy> {
   public:
     using Handle::Handle;
-    static Fallible<Window> create(std::uint32_t radius, std::uint32_t step, double sigma_spatial,
-                                   double sigma_color, double min_variance = 1e-5) {
-        Window window;
+    static Fallible<NccWindow> create(std::uint32_t radius, std::uint32_t step,
+                                      double sigma_spatial, double sigma_color,
+                                      double min_variance = 1e-5) {
+        NccWindow window;
         return detail::give(skep_ncc_window_create(radius, step, sigma_spatial, sigma_color,
-                                               min_variance, window.put()),
+                                                   min_variance, window.put()),
                             window);
     }
 };
 
-/// Correlates the patch at each pixel with its image under the homography of the same place, into
-/// memory of the caller's. Allocates nothing.
-inline Fallible<void> patch_ncc(const Window &window, const Samples &reference,
-                                const Samples &source, Span<const Pixel> pixels,
+/// NCC of the reference patch at pixels[i] with the source patch that homographies[i] maps it to,
+/// into ncc[i]: three spans of the same size. Allocates nothing.
+inline Fallible<void> patch_ncc(const NccWindow &window, const PackedImage &reference,
+                                const PackedImage &source, Span<const Pixel> pixels,
                                 Span<const Homography> homographies, Span<float> ncc) {
     if (homographies.size() != pixels.size() || ncc.size() != pixels.size())
         return detail::give(detail::Status::argument(
@@ -102,7 +106,7 @@ inline Fallible<void> patch_ncc(const Window &window, const Samples &reference,
         any ? homographies.data()->data() : nullptr, pixels.size(), ncc.data()));
 }
 
-} // namespace SKEP_FLAVOUR
+} // namespace SKEP_FLAVOR
 } // namespace skep
 
 #endif // SKEP_KERNELS_HPP

@@ -8,42 +8,46 @@
 #include <type_traits>
 
 namespace skep {
-inline namespace SKEP_FLAVOUR {
+inline namespace SKEP_FLAVOR {
 
 using Progress = skep_progress;
 enum class Flow { Continue, Cancel };
 
-/// A progress callback, or none.
-class Watch {
+/// A callback that receives the progress of a call and may cancel it, or none.
+class ProgressCallback {
   public:
-    Watch() = default;
-    template <class Tell, class Told = std::invoke_result_t<Tell &, const Progress &>>
-    Watch(Tell tell) {
-        static_assert(std::is_void_v<Told> || std::is_same_v<Told, Flow>,
+    ProgressCallback() = default;
+    template <class Callback, class Answer = std::invoke_result_t<Callback &, const Progress &>>
+    ProgressCallback(Callback callback) {
+        static_assert(std::is_void_v<Answer> || std::is_same_v<Answer, Flow>,
                       "callbacks return nothing or a skep::Flow");
-        tell_ = [tell = std::move(tell)](const Progress &progress) mutable {
-            if constexpr (std::is_void_v<Told>) return tell(progress), Flow::Continue;
-            else return tell(progress);
+        callback_ = [callback = std::move(callback)](const Progress &progress) mutable {
+            if constexpr (std::is_void_v<Answer>)
+                return callback(progress), Flow::Continue;
+            else
+                return callback(progress);
         };
     }
 
     /// Makes a call of the C interface that takes a callback: `call(callback, user)`.
-    template <class Call> detail::Status follow(Call call) const {
-        Follower follower{tell_, nullptr};
+    template <class Call> detail::Status run(Call call) const {
+        Running running{callback_, nullptr};
         detail::Status status =
-            call(tell_ ? &Follower::tell : nullptr, static_cast<void *>(&follower));
-        if (follower.thrown) std::rethrow_exception(follower.thrown);
+            call(callback_ ? &Running::report : nullptr, static_cast<void *>(&running));
+        if (running.thrown)
+            std::rethrow_exception(running.thrown);
         return status;
     }
 
   private:
-    struct Follower {
+    struct Running {
         const std::function<Flow(const Progress &)> &callback;
         std::exception_ptr thrown;
 
-        static std::int32_t tell(void *user, const skep_progress *progress) noexcept {
-            auto &self = *static_cast<Follower *>(user);
-            if (self.thrown) return 1;
+        static std::int32_t report(void *user, const skep_progress *progress) noexcept {
+            auto &self = *static_cast<Running *>(user);
+            if (self.thrown)
+                return 1;
 #ifdef SKEP_NO_EXCEPTIONS
             return self.callback(*progress) == Flow::Cancel;
 #else
@@ -56,7 +60,7 @@ class Watch {
 #endif
         }
     };
-    std::function<Flow(const Progress &)> tell_;
+    std::function<Flow(const Progress &)> callback_;
 };
 
 namespace detail {
@@ -68,7 +72,8 @@ template <class Raw, void (*destroy)(Raw *)> class Handle {
     explicit Handle(Raw *raw) noexcept : raw_(raw) {}
     Handle(Handle &&other) noexcept : raw_(other.release()) {}
     Handle &operator=(Handle &&other) noexcept {
-        if (this != &other) destroy(std::exchange(raw_, other.release()));
+        if (this != &other)
+            destroy(std::exchange(raw_, other.release()));
         return *this;
     }
     ~Handle() { destroy(raw_); }
@@ -85,7 +90,7 @@ template <class Raw, void (*destroy)(Raw *)> class Handle {
 };
 } // namespace detail
 
-} // namespace SKEP_FLAVOUR
+} // namespace SKEP_FLAVOR
 } // namespace skep
 
 #endif // SKEP_OBJECT_HPP

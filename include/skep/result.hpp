@@ -5,7 +5,7 @@
 #include "scene.hpp"
 
 namespace skep {
-inline namespace SKEP_FLAVOUR {
+inline namespace SKEP_FLAVOR {
 
 /// Three numbers a point each, and three bytes of red, green and blue.
 struct Points {
@@ -61,7 +61,8 @@ enum class Maps : std::uint32_t { Raw = SKEP_MAPS_RAW, Validated = SKEP_MAPS_VAL
 /// Maps of views, and the cloud when they come from a whole run.
 ///
 /// Maps are copied into what the caller passes, which may be a cv::Mat, or are returned as a
-/// skep::Map. The borrow_ functions look at them inside the result, as long as it lives.
+/// skep::Map. The borrow_ functions return views of the result's own memory, valid as long as it
+/// lives.
 class Result : public detail::Handle<skep_result, skep_result_destroy> {
   public:
     using Handle::Handle;
@@ -137,7 +138,7 @@ class Result : public detail::Handle<skep_result, skep_result_destroy> {
         skep_statistics statistics = {};
         return detail::give(skep_result_get_statistics(get(), view, &statistics), statistics);
     }
-    /// What the user of a run should read.
+    /// Warnings of the run for its user, such as views without any source view.
     Fallible<std::vector<std::string>> warnings() const {
         std::vector<std::string> warnings;
         if (!*this)
@@ -160,7 +161,7 @@ class Result : public detail::Handle<skep_result, skep_result_destroy> {
   private:
     template <class T, class Call, class M, class... Where>
     detail::Status copy(Call call, std::uint32_t channels, M &map, std::uint32_t view,
-                         Where... where) const {
+                        Where... where) const {
         Size size;
         MapView<T> into;
         return detail::Status(skep_result_get_size(get(), view, &size.width, &size.height))
@@ -190,17 +191,17 @@ class Result : public detail::Handle<skep_result, skep_result_destroy> {
 
 /// A whole run.
 inline Fallible<Result> reconstruct(const Scene &scene, OptionsOrDefault options = {},
-                                    const Watch &watch = {}) {
+                                    const ProgressCallback &progress = {}) {
     Result result;
     detail::Status status = options.check().then([&] {
-        return watch.follow([&](skep_progress_fn callback, void *user) {
+        return progress.run([&](skep_progress_fn callback, void *user) {
             return skep_reconstruct(scene.get(), options.get(), callback, user, result.put());
         });
     });
     return detail::give(std::move(status), result);
 }
 
-/// A view to be fused: skep::look gives the maps, skep::image the picture.
+/// A view to be fused: skep::map_view gives the maps, skep::image the picture.
 struct FusionView {
     skep_camera camera;
     MapView<const float> depth;
@@ -211,7 +212,7 @@ struct FusionView {
 
 /// Fuses any maps.
 inline Fallible<Cloud> fuse(Span<const FusionView> views, OptionsOrDefault options = {},
-                            const Watch &watch = {}) {
+                            const ProgressCallback &progress = {}) {
     Cloud cloud;
     std::vector<skep_fusion_view> raw;
     detail::Status status = options.check();
@@ -220,21 +221,21 @@ inline Fallible<Cloud> fuse(Span<const FusionView> views, OptionsOrDefault optio
         if (status && (depth.width != normal.width || depth.height != normal.height))
             status =
                 detail::Status::argument("views[" + std::to_string(raw.size()) + "].normal",
-                                          detail::by(normal.width, normal.height),
-                                          detail::by(depth.width, depth.height) + ", as the depth");
+                                         detail::by(normal.width, normal.height),
+                                         detail::by(depth.width, depth.height) + ", as the depth");
         raw.push_back({&view.camera, depth.width, depth.height, depth.data, depth.stride_bytes,
                        normal.data, normal.stride_bytes, view.image ? &*view.image : nullptr,
                        view.overlap.data(), view.overlap.size()});
     }
     status = std::move(status).then([&] {
-        return watch.follow([&](skep_progress_fn callback, void *user) {
+        return progress.run([&](skep_progress_fn callback, void *user) {
             return skep_fuse(raw.data(), raw.size(), options.get(), callback, user, cloud.put());
         });
     });
     return detail::give(std::move(status), cloud);
 }
 
-} // namespace SKEP_FLAVOUR
+} // namespace SKEP_FLAVOR
 } // namespace skep
 
 #endif // SKEP_RESULT_HPP

@@ -1,78 +1,15 @@
-// Options and scenes. Part of skep.hpp.
+// Scenes. Part of skep.hpp.
 #ifndef SKEP_SCENE_HPP
 #define SKEP_SCENE_HPP
 
-#include "object.hpp"
+#include "options.hpp"
 #include "shapes.hpp"
 
 namespace skep {
-inline namespace SKEP_FLAVOUR {
+inline namespace SKEP_FLAVOR {
 
-/// Every number the method depends on.
-class Options : public detail::Handle<skep_options, skep_options_destroy> {
-  public:
-    using Handle::Handle;
-#ifndef SKEP_NO_EXCEPTIONS
-    explicit Options(const char *preset = "default") : Options(create(preset)) {}
-#endif
-    static Fallible<Options> create(const char *preset = "default") {
-        Options options(static_cast<skep_options *>(nullptr));
-        return detail::give(skep_options_create(preset, options.put()), options);
-    }
-    Fallible<void> set(const char *name, double value) {
-        return detail::give(skep_options_set(get(), name, value));
-    }
-    Fallible<double> get(const char *name) const {
-        double value = 0;
-        return detail::give(skep_options_get(get(), name, &value), value);
-    }
-    Fallible<std::uint64_t> seed() const {
-        std::uint64_t seed = 0;
-        return detail::give(skep_options_get_seed(get(), &seed), seed);
-    }
-    Fallible<void> set_seed(std::uint64_t seed) {
-        return detail::give(skep_options_set_seed(get(), seed));
-    }
-    /// nullptr is the best the machine has.
-    Fallible<void> set_simd(const char *level) {
-        return detail::give(skep_options_set_simd(get(), level));
-    }
-    Fallible<void> set_scales(Span<const skep_scale> scales) {
-        return detail::give(skep_options_set_scales(get(), scales.data(), scales.size()));
-    }
-    Fallible<std::vector<skep_scale>> scales() const {
-        return detail::list<skep_scale>(
-            [&](auto... out) { return skep_options_get_scales(get(), out...); });
-    }
-    /// The names of all options that are numbers.
-    static std::vector<std::string> names() {
-        std::vector<std::string> names;
-        while (const char *name = skep_option_name(names.size()))
-            names.emplace_back(name);
-        return names;
-    }
-    using Handle::get;
-};
-
-/// Options, or none for the default.
-class OptionsOrDefault {
-  public:
-    OptionsOrDefault() = default;
-    OptionsOrDefault(const Options &options) : raw_(options.get()), is_empty_(!options) {}
-    const skep_options *get() const noexcept { return raw_; }
-    /// Options that were moved from are not the default.
-    detail::Status check() const {
-        return is_empty_ ? detail::Status::argument("options", "empty",
-                                                     "options that were not moved from")
-                         : detail::Status();
-    }
-
-  private:
-    const skep_options *raw_ = nullptr;
-    bool is_empty_ = false;
-};
-
-struct Range {
+/// Depths in world units; {0, 0} stands for the range that the sparse points suggest.
+struct DepthRange {
     double near_depth = 0, far_depth = 0;
 };
 
@@ -88,7 +25,7 @@ class Scene : public detail::Handle<skep_scene, skep_scene_destroy> {
         return detail::give(skep_scene_create(scene.put()), scene);
     }
     /// (0, 0) takes the depth ranges from the sparse points.
-    static Fallible<Scene> read_colmap(const std::string &folder, Range range = {}) {
+    static Fallible<Scene> read_colmap(const std::string &folder, DepthRange range = {}) {
         Scene scene(nullptr);
         return detail::give(
             skep_scene_read_colmap(folder.c_str(), range.near_depth, range.far_depth, scene.put()),
@@ -105,7 +42,7 @@ class Scene : public detail::Handle<skep_scene, skep_scene_destroy> {
                                      const char *name = nullptr) {
         std::uint32_t view = 0;
         skep_image image = {};
-        detail::Status status = detail::look_at_image(picture, false, "picture", image).then([&] {
+        detail::Status status = detail::image_of(picture, false, "picture", image).then([&] {
             return skep_scene_add_view(get(), name, &image, &camera, &view);
         });
         return detail::give(std::move(status), view);
@@ -115,7 +52,7 @@ class Scene : public detail::Handle<skep_scene, skep_scene_destroy> {
         MapView<const std::uint8_t> map;
         Size size;
         return detail::give(
-            detail::look<const std::uint8_t>(mask, 1, "mask", map)
+            detail::view_of<const std::uint8_t>(mask, 1, "mask", map)
                 .then([&] {
                     return skep_scene_get_view(get(), view, &size.width, &size.height, nullptr);
                 })
@@ -126,7 +63,7 @@ class Scene : public detail::Handle<skep_scene, skep_scene_destroy> {
     Fallible<void> clear_mask(std::uint32_t view) {
         return detail::give(skep_scene_set_mask(get(), view, nullptr, 0));
     }
-    Fallible<void> set_depth_range(std::uint32_t view, Range range) {
+    Fallible<void> set_depth_range(std::uint32_t view, DepthRange range) {
         return detail::give(
             skep_scene_set_depth_range(get(), view, range.near_depth, range.far_depth));
     }
@@ -137,9 +74,9 @@ class Scene : public detail::Handle<skep_scene, skep_scene_destroy> {
     Fallible<void> add_points(Span<const double> positions, Span<const std::uint32_t> view_counts,
                               Span<const std::uint32_t> views) {
         if (positions.size() != 3 * view_counts.size())
-            return detail::give(
-                detail::Status::argument("positions", std::to_string(positions.size()) + " long",
-                                          std::to_string(3 * view_counts.size())));
+            return detail::give(detail::Status::argument("positions",
+                                                         std::to_string(positions.size()) + " long",
+                                                         std::to_string(3 * view_counts.size())));
         return detail::give(skep_scene_add_points(get(), positions.data(), view_counts.size(),
                                                   view_counts.data(), views.data(), views.size()));
     }
@@ -163,8 +100,8 @@ class Scene : public detail::Handle<skep_scene, skep_scene_destroy> {
             name, [&](auto... out) { return skep_scene_get_name(get(), view, out...); });
         return detail::give(std::move(status), name);
     }
-    Fallible<Range> depth_range(std::uint32_t view) const {
-        Range range;
+    Fallible<DepthRange> depth_range(std::uint32_t view) const {
+        DepthRange range;
         return detail::give(
             skep_scene_get_depth_range(get(), view, &range.near_depth, &range.far_depth), range);
     }
@@ -187,7 +124,7 @@ class Scene : public detail::Handle<skep_scene, skep_scene_destroy> {
     }
 };
 
-} // namespace SKEP_FLAVOUR
+} // namespace SKEP_FLAVOR
 } // namespace skep
 
 #endif // SKEP_SCENE_HPP

@@ -14,7 +14,7 @@
 #endif
 
 namespace skep {
-inline namespace SKEP_FLAVOUR {
+inline namespace SKEP_FLAVOR {
 
 #if __cplusplus >= 202002L
 template <class T> using Span = std::span<T>;
@@ -110,7 +110,7 @@ template <class M>
 struct IsSubscripted<M, Sink<decltype(double(std::declval<M &>()[0]))>> : std::true_type {};
 template <class M, class = void> struct IsSubscriptedTwice : std::false_type {};
 template <class M>
-struct IsSubscriptedTwice<M, Sink<decltype(double(std::declval<M &>()[0][0]))>> : std::true_type {};
+struct IsSubscriptedTwice<M, Sink<decltype(double(std::declval<M &>()[0][0]))>> : std::true_type{};
 template <class M, class = void> struct HasSize : std::false_type {};
 template <class M>
 struct HasSize<M, Sink<decltype(std::size(std::declval<M &>()))>> : std::true_type {};
@@ -118,26 +118,31 @@ struct HasSize<M, Sink<decltype(std::size(std::declval<M &>()))>> : std::true_ty
 /// OpenCV's number for a type of elements; unsigned 32-bit numbers go where it has signed ones.
 template <class T> constexpr int cv_depth() {
     using U = std::remove_cv_t<T>;
-    if constexpr (std::is_same_v<U, std::uint8_t>) return 0;
-    else if constexpr (std::is_same_v<U, std::uint16_t>) return 2;
-    else if constexpr (std::is_same_v<U, std::uint32_t>) return 4;
-    else if constexpr (std::is_same_v<U, float>) return 5;
-    else return 6;
+    if constexpr (std::is_same_v<U, std::uint8_t>)
+        return 0;
+    else if constexpr (std::is_same_v<U, std::uint16_t>)
+        return 2;
+    else if constexpr (std::is_same_v<U, std::uint32_t>)
+        return 4;
+    else if constexpr (std::is_same_v<U, float>)
+        return 5;
+    else
+        return 6;
 }
 
 inline std::string by(long long a, long long b) {
     return std::to_string(a) + " x " + std::to_string(b);
 }
 
-/// Looks at a map of any kind as `channels` numbers of type T a pixel.
+/// A view of a map of any kind, of `channels` numbers of type T a pixel.
 template <class T, class M>
-Status look(M &map, std::uint32_t channels, const char *name, MapView<T> &view) {
+Status view_of(M &map, std::uint32_t channels, const char *name, MapView<T> &view) {
     std::uint32_t found = 0;
     bool fits = true;
     if constexpr (IsMat<M>::value) {
         if (map.rows <= 0 || map.cols <= 0)
             return Status::argument(name, by(map.cols, map.rows),
-                                     "a matrix of two dimensions that is not empty");
+                                    "a matrix of two dimensions that is not empty");
         view.data = reinterpret_cast<T *>(map.data);
         view.width = std::uint32_t(map.cols), view.height = std::uint32_t(map.rows);
         view.stride_bytes = std::size_t(map.step);
@@ -153,13 +158,14 @@ Status look(M &map, std::uint32_t channels, const char *name, MapView<T> &view) 
         fits = map.data.size() == std::size_t(map.width) * map.height * map.channels;
     }
     view.channels = channels;
-    if (fits && found == channels) return {};
+    if (fits && found == channels)
+        return {};
     return Status::argument(
         name, "a map of " + std::to_string(found) + " channel(s) of another type or length",
         std::to_string(channels) + " channel(s) of " + std::to_string(sizeof(T)) + " bytes");
 }
 
-/// Gives a map of any kind this size, or finds that it has it, and looks at it.
+/// Resizes a map of any kind, or checks its size where it cannot be resized; gives a view of it.
 template <class T, class M>
 Status make(M &map, Size size, std::uint32_t channels, const char *name, MapView<T> &view) {
     if constexpr (IsMat<M>::value) {
@@ -169,10 +175,11 @@ Status make(M &map, Size size, std::uint32_t channels, const char *name, MapView
     } else if constexpr (!std::is_pointer_v<decltype(map.data)>) {
         map = Map<T>(size, channels);
     }
-    return look<T>(map, channels, name, view).then([&]() -> Status {
-        if (view.width == size.width && view.height == size.height) return {};
+    return view_of<T>(map, channels, name, view).then([&]() -> Status {
+        if (view.width == size.width && view.height == size.height)
+            return {};
         return Status::argument(name, by(view.width, view.height),
-                                 by(size.width, size.height) + ", as the view");
+                                by(size.width, size.height) + ", as the view");
     });
 }
 
@@ -187,7 +194,8 @@ Status read(const M &matrix, int rows, int columns, const char *name, double *ou
         has_rows = matrix.rows(), has_columns = matrix.cols();
     else if constexpr (IsCalled<const M>::value || IsMat<const M>::value)
         has_rows = matrix.rows, has_columns = matrix.cols;
-    else has_rows = (long long)std::size(matrix), has_columns = (long long)std::size(matrix[0]);
+    else
+        has_rows = (long long)std::size(matrix), has_columns = (long long)std::size(matrix[0]);
     if (has_rows != rows || has_columns != columns)
         return Status::argument(name, by(has_rows, has_columns), by(rows, columns));
     for (int i = 0; i < rows * columns; ++i) {
@@ -200,10 +208,11 @@ Status read(const M &matrix, int rows, int columns, const char *name, double *ou
             const auto *start = matrix.data + std::size_t(matrix.step) * std::size_t(row);
             if (matrix.channels() != 1 || (matrix.depth() != 5 && matrix.depth() != 6))
                 return Status::argument(name, "a matrix of another type",
-                                         "one channel of float or double");
+                                        "one channel of float or double");
             if (matrix.depth() == 5)
                 out[i] = double(reinterpret_cast<const float *>(start)[column]);
-            else out[i] = reinterpret_cast<const double *>(start)[column];
+            else
+                out[i] = reinterpret_cast<const double *>(start)[column];
         }
     }
     return {};
@@ -226,7 +235,7 @@ template <class V> Status read_vector(const V &vector, const char *name, double 
 }
 
 template <class Image>
-Status look_at_image(const Image &image, bool is_rgb, const char *name, skep_image &out) {
+Status image_of(const Image &image, bool is_rgb, const char *name, skep_image &out) {
     if constexpr (std::is_same_v<Image, skep_image>) {
         out = image;
         return {};
@@ -236,11 +245,11 @@ Status look_at_image(const Image &image, bool is_rgb, const char *name, skep_ima
         const int depth = image.depth(), channels = image.channels();
         if (image.rows <= 0 || image.cols <= 0)
             return Status::argument(name, by(image.cols, image.rows),
-                                     "a picture that is not empty");
+                                    "a picture that is not empty");
         if ((depth != 0 && depth != 2 && depth != 5) ||
             (channels != 1 && channels != 3 && channels != 4))
             return Status::argument(name, "of another type",
-                                     "8, 16 or float bits of 1, 3 or 4 channels");
+                                    "8, 16 or float bits of 1, 3 or 4 channels");
         const int layout = channels == 1   ? SKEP_FORMAT_GRAY
                            : channels == 3 ? (is_rgb ? SKEP_FORMAT_RGB : SKEP_FORMAT_BGR)
                                            : (is_rgb ? SKEP_FORMAT_RGBA : SKEP_FORMAT_BGRA);
@@ -254,19 +263,20 @@ Status look_at_image(const Image &image, bool is_rgb, const char *name, skep_ima
 
 enum class Order { Bgr, Rgb };
 
-/// Looks at a picture of the shape of cv::Mat; colors are in OpenCV's order unless told otherwise.
+/// A skep_image of a picture of the shape of cv::Mat, without a copy; colors are in OpenCV's order
+/// unless told otherwise.
 template <class Image> Fallible<skep_image> image(const Image &picture, Order order = Order::Bgr) {
     skep_image out = {};
-    detail::Status status = detail::look_at_image(picture, order == Order::Rgb, "picture", out);
+    detail::Status status = detail::image_of(picture, order == Order::Rgb, "picture", out);
     return detail::give(std::move(status), out);
 }
 
-/// Looks at any map as `channels` numbers of type T a pixel, such as look<float>(depth) or
-/// look<float>(normals, 3).
+/// A view of any map, of `channels` numbers of type T a pixel, without a copy:
+/// map_view<float>(depth) or map_view<float>(normals, 3).
 template <class T, class M>
-Fallible<MapView<const T>> look(const M &map, std::uint32_t channels = 1) {
+Fallible<MapView<const T>> map_view(const M &map, std::uint32_t channels = 1) {
     MapView<const T> view;
-    detail::Status status = detail::look<const T>(map, channels, "map", view);
+    detail::Status status = detail::view_of<const T>(map, channels, "map", view);
     return detail::give(std::move(status), view);
 }
 
@@ -280,15 +290,15 @@ Fallible<skep_camera> camera(const K &k, const R &rotation, const T &translation
             .then([&] { return detail::read(rotation, 3, 3, "R", camera.rotation); })
             .then([&] { return detail::read_vector(translation, "t", camera.translation); })
             .then([&]() -> detail::Status {
-                if (m[1] == 0 && m[3] == 0 && m[6] == 0 && m[7] == 0 && m[8] == 1) return {};
-                return detail::Status::argument("K", "another matrix",
-                                                 "[fx 0 cx; 0 fy cy; 0 0 1]");
+                if (m[1] == 0 && m[3] == 0 && m[6] == 0 && m[7] == 0 && m[8] == 1)
+                    return {};
+                return detail::Status::argument("K", "another matrix", "[fx 0 cx; 0 fy cy; 0 0 1]");
             });
     camera.fx = m[0], camera.cx = m[2], camera.fy = m[4], camera.cy = m[5];
     return detail::give(std::move(status), camera);
 }
 
-} // namespace SKEP_FLAVOUR
+} // namespace SKEP_FLAVOR
 } // namespace skep
 
 #endif // SKEP_SHAPES_HPP

@@ -1,13 +1,13 @@
-// A run taken apart. Part of skep.hpp.
-#ifndef SKEP_STEPS_HPP
-#define SKEP_STEPS_HPP
+// The stepwise level: the stages of a run on single views. Part of skep.hpp.
+#ifndef SKEP_STEPPER_HPP
+#define SKEP_STEPPER_HPP
 
 #include "result.hpp"
 
 namespace skep {
-inline namespace SKEP_FLAVOUR {
+inline namespace SKEP_FLAVOR {
 
-/// What is known of one view between two stepper; empty when nothing is.
+/// The maps of one view after skep_stepper_search or skep_stepper_check; empty: no estimate yet.
 class Estimate : public detail::Handle<skep_estimate, skep_estimate_destroy> {
   public:
     using Handle::Handle;
@@ -27,7 +27,7 @@ class Estimate : public detail::Handle<skep_estimate, skep_estimate_destroy> {
             maps.depth.resize(pixels), maps.normal.resize(3 * pixels);
             maps.cost.resize(pixels), maps.validated.resize(pixels);
             return skep_estimate_get_maps(get(), maps.depth.data(), maps.normal.data(),
-                                       maps.cost.data(), maps.validated.data(), pixels);
+                                          maps.cost.data(), maps.validated.data(), pixels);
         });
         return detail::give(std::move(status), maps);
     }
@@ -37,14 +37,15 @@ class Estimate : public detail::Handle<skep_estimate, skep_estimate_destroy> {
     }
 };
 
-/// Planes that other views offer to the pixels of a view.
+/// Planes of other views, transferred to the pixels of a view.
 class Candidates : public detail::Handle<skep_candidates, skep_candidates_destroy> {
   public:
     using Handle::Handle;
 };
 
-/// A run taken apart; skep.h says in which order. States are one for each view of the scene, empty
-/// ones where nothing is known; an empty span knows of none.
+/// The stages of a run on single views; skep.h lists their order, what each changes and what each
+/// reads. Spans of estimates hold one for each view of the scene, empty where there is none yet; an
+/// empty span stands for no estimates at all.
 class Stepper : public detail::Handle<skep_stepper, skep_stepper_destroy> {
   public:
     using Handle::Handle;
@@ -54,7 +55,7 @@ class Stepper : public detail::Handle<skep_stepper, skep_stepper_destroy> {
             [&] { return skep_stepper_create(scene.get(), options.get(), stepper.put()); });
         return detail::give(std::move(status), stepper);
     }
-    Fallible<std::uint32_t> step_count() const {
+    Fallible<std::uint32_t> cycle_count() const {
         std::uint32_t count = 0;
         return detail::give(skep_stepper_get_count(get(), &count, nullptr), count);
     }
@@ -62,80 +63,89 @@ class Stepper : public detail::Handle<skep_stepper, skep_stepper_destroy> {
         std::uint32_t count = 0;
         return detail::give(skep_stepper_get_count(get(), nullptr, &count), count);
     }
-    Fallible<skep_cycle> step(std::uint32_t step) const {
+    Fallible<skep_cycle> cycle(std::uint32_t cycle) const {
         skep_cycle out = {};
-        return detail::give(skep_stepper_get_cycle(get(), step, &out), out);
+        return detail::give(skep_stepper_get_cycle(get(), cycle, &out), out);
     }
-    Fallible<Size> size(std::uint32_t step, std::uint32_t view) const {
+    Fallible<Size> size(std::uint32_t cycle, std::uint32_t view) const {
         Size size;
-        return detail::give(skep_stepper_get_size(get(), step, view, &size.width, &size.height),
+        return detail::give(skep_stepper_get_size(get(), cycle, view, &size.width, &size.height),
                             size);
     }
     Fallible<std::vector<std::uint32_t>> sources(std::uint32_t view) const {
         return detail::list<std::uint32_t>(
             [&](auto... out) { return skep_stepper_get_sources(get(), view, out...); });
     }
-    Fallible<Candidates> propagate(std::uint32_t step, std::uint32_t view,
-                               Span<const Estimate> estimates) const {
+    Fallible<Candidates> propagate(std::uint32_t cycle, std::uint32_t view,
+                                   Span<const Estimate> estimates) const {
         Candidates candidates;
         const Raw raw(estimates);
         return detail::give(
-            skep_stepper_propagate(get(), step, view, raw.data(), raw.size(), candidates.put()), candidates);
+            skep_stepper_propagate(get(), cycle, view, raw.data(), raw.size(), candidates.put()),
+            candidates);
     }
-    /// Candidates may be empty.
-    Fallible<Estimate> search(std::uint32_t step, std::uint32_t view, Span<const Estimate> estimates,
-                           const Candidates &candidates = Candidates(), const Watch &watch = {}) const {
+    /// Candidates may be empty. The estimate is to be checked before anything else.
+    Fallible<Estimate> search(std::uint32_t cycle, std::uint32_t view,
+                              Span<const Estimate> estimates,
+                              const Candidates &candidates = Candidates(),
+                              const ProgressCallback &progress = {}) const {
         Estimate estimate;
         const Raw raw(estimates);
-        detail::Status status = watch.follow([&](skep_progress_fn callback, void *user) {
-            return skep_stepper_search(get(), step, view, raw.data(), raw.size(), candidates.get(),
-                                     callback, user, estimate.put());
+        detail::Status status = progress.run([&](skep_progress_fn callback, void *user) {
+            return skep_stepper_search(get(), cycle, view, raw.data(), raw.size(), candidates.get(),
+                                       callback, user, estimate.put());
         });
         return detail::give(std::move(status), estimate);
     }
-    Fallible<Estimate> check(std::uint32_t step, std::uint32_t view, Span<const Estimate> estimates) const {
+    Fallible<Estimate> check(std::uint32_t cycle, std::uint32_t view,
+                             Span<const Estimate> estimates) const {
         Estimate estimate;
         const Raw raw(estimates);
         return detail::give(
-            skep_stepper_check(get(), step, view, raw.data(), raw.size(), estimate.put()), estimate);
+            skep_stepper_check(get(), cycle, view, raw.data(), raw.size(), estimate.put()),
+            estimate);
     }
-    Fallible<Estimate> upsample(std::uint32_t step, std::uint32_t view, const Estimate &estimate) const {
+    Fallible<Estimate> upsample(std::uint32_t cycle, std::uint32_t view,
+                                const Estimate &estimate) const {
         Estimate finer;
-        return detail::give(skep_stepper_upsample(get(), step, view, estimate.get(), finer.put()), finer);
+        return detail::give(skep_stepper_upsample(get(), cycle, view, estimate.get(), finer.put()),
+                            finer);
     }
-    /// Nothing after the last step.
-    Fallible<std::optional<std::uint32_t>> next(std::uint32_t step,
+    /// The cycle after this one; nothing after the last.
+    Fallible<std::optional<std::uint32_t>> next(std::uint32_t cycle,
                                                 Span<const Estimate> estimates) const {
         std::uint32_t next = SKEP_CYCLE_NONE;
         const Raw raw(estimates);
-        detail::Status status = skep_stepper_next(get(), step, raw.data(), raw.size(), &next);
+        detail::Status status = skep_stepper_next(get(), cycle, raw.data(), raw.size(), &next);
         std::optional<std::uint32_t> found;
-        if (next != SKEP_CYCLE_NONE) found = next;
+        if (next != SKEP_CYCLE_NONE)
+            found = next;
         return detail::give(std::move(status), found);
     }
     Fallible<Result> finish(std::uint32_t view, Span<const Estimate> estimates,
-                            const Watch &watch = {}) const {
+                            const ProgressCallback &progress = {}) const {
         Result result;
         const Raw raw(estimates);
-        detail::Status status = watch.follow([&](skep_progress_fn callback, void *user) {
+        detail::Status status = progress.run([&](skep_progress_fn callback, void *user) {
             return skep_stepper_finish(get(), view, raw.data(), raw.size(), callback, user,
-                                     result.put());
+                                       result.put());
         });
         return detail::give(std::move(status), result);
     }
-    /// A estimate from maps of one and three floats a pixel. Pass what says which solutions count as
-    /// validated (bytes) and what they cost (floats), or a Map that is empty.
+    /// An estimate from maps of one and three floats a pixel; optionally with a map of bytes, not 0
+    /// where the plane counts as validated, and a map of costs. An empty Map stands for none.
     template <class Depth, class Normal, class Validated = Map<std::uint8_t>,
               class Cost = Map<float>>
-    Fallible<Estimate> state_from_maps(std::uint32_t step, std::uint32_t view, const Depth &depth,
-                                    const Normal &normal, const Validated &validated = {},
-                                    const Cost &cost = {}) const {
+    Fallible<Estimate> estimate_from_maps(std::uint32_t cycle, std::uint32_t view,
+                                          const Depth &depth, const Normal &normal,
+                                          const Validated &validated = {},
+                                          const Cost &cost = {}) const {
         Estimate estimate;
         Size size;
         MapView<const float> depths, normals, costs;
         MapView<const std::uint8_t> verdicts;
         detail::Status status =
-            detail::Status(skep_stepper_get_size(get(), step, view, &size.width, &size.height))
+            detail::Status(skep_stepper_get_size(get(), cycle, view, &size.width, &size.height))
                 .then([&] { return sized(depth, size, 1, "depth", depths); })
                 .then([&] { return sized(normal, size, 3, "normal", normals); })
                 .then([&] {
@@ -146,16 +156,18 @@ class Stepper : public detail::Handle<skep_stepper, skep_stepper_destroy> {
                     return is_none(cost) ? detail::Status() : sized(cost, size, 1, "cost", costs);
                 })
                 .then([&] {
-                    return skep_estimate_from_maps(get(), step, view, depths.data, depths.stride_bytes,
-                                                normals.data, normals.stride_bytes, verdicts.data,
-                                                verdicts.stride_bytes, costs.data,
-                                                costs.stride_bytes, estimate.put());
+                    return skep_estimate_from_maps(
+                        get(), cycle, view, depths.data, depths.stride_bytes, normals.data,
+                        normals.stride_bytes, verdicts.data, verdicts.stride_bytes, costs.data,
+                        costs.stride_bytes, estimate.put());
                 });
         return detail::give(std::move(status), estimate);
     }
+    /// An estimate from the bytes of Estimate::save.
     Fallible<Estimate> load(Span<const std::uint8_t> bytes) const {
         Estimate estimate;
-        return detail::give(skep_estimate_load(get(), bytes.data(), bytes.size(), estimate.put()), estimate);
+        return detail::give(skep_estimate_load(get(), bytes.data(), bytes.size(), estimate.put()),
+                            estimate);
     }
 
   private:
@@ -167,19 +179,22 @@ class Stepper : public detail::Handle<skep_stepper, skep_stepper_destroy> {
     };
     template <class T, class M>
     static detail::Status sized(const M &map, Size size, std::uint32_t channels, const char *name,
-                                 MapView<T> &view) {
-        return detail::look<T>(map, channels, name, view).then([&] {
+                                MapView<T> &view) {
+        return detail::view_of<T>(map, channels, name, view).then([&] {
             return detail::make<T>(view, size, channels, name, view);
         });
     }
     template <class M> static bool is_none(const M &map) {
-        if constexpr (detail::IsMat<const M>::value) return map.data == nullptr;
-        else if constexpr (std::is_pointer_v<decltype(map.data)>) return map.data == nullptr;
-        else return map.data.empty();
+        if constexpr (detail::IsMat<const M>::value)
+            return map.data == nullptr;
+        else if constexpr (std::is_pointer_v<decltype(map.data)>)
+            return map.data == nullptr;
+        else
+            return map.data.empty();
     }
 };
 
-} // namespace SKEP_FLAVOUR
+} // namespace SKEP_FLAVOR
 } // namespace skep
 
-#endif // SKEP_STEPS_HPP
+#endif // SKEP_STEPPER_HPP

@@ -1,11 +1,15 @@
-//! Maps inside a result, for hosts that would rather look than copy.
+//! Maps inside a result, without a copy.
 
 use super::pointers::{get, out};
 use super::result::skep_result;
 use super::status::{guard, skep_status};
 
-/// The raw depth map inside the result, without a copy: height rows of width floats, dense. Valid until the result is
-/// destroyed; only to be read.
+/// Borrows the raw depth map of a view.
+///
+/// @param result     The result.
+/// @param view       Number of a view in the result.
+/// @param depth_out  Receives the address of width * height floats, row after row; owned by the result.
+/// @retval SKEP_ERR_ARGUMENT  No such view in the result.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_result_borrow_depth(
     result: *const skep_result,
@@ -20,8 +24,12 @@ pub unsafe extern "C" fn skep_result_borrow_depth(
     })
 }
 
-/// The raw normal map inside the result, without a copy: height rows of width times x, y, z, dense. Valid until the
-/// result is destroyed; only to be read.
+/// Borrows the raw normal map of a view.
+///
+/// @param result      The result.
+/// @param view        Number of a view in the result.
+/// @param normal_out  Receives the address of 3 * width * height floats, row after row; owned by the result.
+/// @retval SKEP_ERR_ARGUMENT  No such view in the result.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_result_borrow_normal(
     result: *const skep_result,
@@ -36,8 +44,12 @@ pub unsafe extern "C" fn skep_result_borrow_normal(
     })
 }
 
-/// The costs inside the result, without a copy, as skep_result_get_cost explains them. Valid until the result is
-/// destroyed; only to be read.
+/// Borrows the matching costs of a view; see skep_result_get_cost.
+///
+/// @param result    The result.
+/// @param view      Number of a view in the result.
+/// @param cost_out  Receives the address of width * height floats, row after row; owned by the result.
+/// @retval SKEP_ERR_ARGUMENT  No such view in the result.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_result_borrow_cost(
     result: *const skep_result,
@@ -52,8 +64,12 @@ pub unsafe extern "C" fn skep_result_borrow_cost(
     })
 }
 
-/// The SKEP_PIXEL_ values inside the result, without a copy: height rows of width bytes, dense. Valid until the result
-/// is destroyed; only to be read.
+/// Borrows the status of the pixels of a view, SKEP_PIXEL_ values.
+///
+/// @param result      The result.
+/// @param view        Number of a view in the result.
+/// @param status_out  Receives the address of width * height bytes, row after row; owned by the result.
+/// @retval SKEP_ERR_ARGUMENT  No such view in the result.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_result_borrow_status(
     result: *const skep_result,
@@ -63,7 +79,7 @@ pub unsafe extern "C" fn skep_result_borrow_status(
     guard(|| {
         // SAFETY: as the header demands of the caller.
         let (result, out) = unsafe { (get(result, "result")?, out(status_out, "status_out")?) };
-        // An status is one byte, its discriminant.
+        // A status is one byte, its discriminant.
         out.set(result.view(view)?.status.as_ptr().cast());
         Ok(())
     })

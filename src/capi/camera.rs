@@ -4,23 +4,23 @@ use super::status::Failure;
 use crate::geometry::Camera;
 use glam::{DMat3, DVec3};
 
-/// A pinhole camera without distortion. x_cam = rotation * X_world + translation, with x right, y down, z forward;
-/// depth is z. The center of the top-left pixel is (0, 0), as in OpenCV; COLMAP's principal points are half a pixel
-/// larger. This struct never changes.
+/// A pinhole camera without distortion. x_cam = rotation * X_world + translation, with x right, y down, z
+/// forward; depth is z. The center of the top-left pixel is (0, 0), as in OpenCV; COLMAP's principal points
+/// are half a pixel larger. The layout of this struct is frozen.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct skep_camera {
-    /// Focal lengths in pixels, above 0.
+    /// Focal length in x, in pixels, above 0.
     pub fx: f64,
-    /// See fx.
+    /// Focal length in y, in pixels, above 0.
     pub fy: f64,
-    /// Principal point in pixels.
+    /// Column of the principal point, in pixels.
     pub cx: f64,
-    /// See cx.
+    /// Row of the principal point, in pixels.
     pub cy: f64,
-    /// World to camera, row by row; orthonormal within 1e-4, determinant 1.
+    /// Rotation from world to camera, row by row; orthonormal within 1e-4, determinant 1.
     pub rotation: [f64; 9],
-    /// World to camera, in world units.
+    /// Translation from world to camera, in world units.
     pub translation: [f64; 3],
 }
 

@@ -5,12 +5,14 @@ use super::status::{guard, skep_status};
 use crate::fusion::PointCloud;
 use std::sync::Arc;
 
-/// Fused points. Never changes: may be used from several threads at once.
+/// Fused points. Immutable.
 pub struct skep_cloud {
     pub(super) points: Arc<PointCloud>,
 }
 
-/// Destroys a cloud; NULL is ignored.
+/// Destroys a cloud. The result it was taken from is not affected.
+///
+/// @param cloud  The cloud; NULL is ignored.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_cloud_destroy(cloud: *mut skep_cloud) {
     guard(|| {
@@ -20,7 +22,11 @@ pub unsafe extern "C" fn skep_cloud_destroy(cloud: *mut skep_cloud) {
     });
 }
 
-/// The number of points and, when `view_total_out` is not NULL, the lengths of their view lists added up.
+/// Gets the number of points.
+///
+/// @param cloud           The cloud.
+/// @param count_out       Receives the number of points.
+/// @param view_total_out  Receives the sum of the lengths of their view lists; may be NULL.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_cloud_get_count(
     cloud: *const skep_cloud,
@@ -38,9 +44,14 @@ pub unsafe extern "C" fn skep_cloud_get_count(
     })
 }
 
-/// Copies the points: `positions` x, y, z in the world (3 doubles a point), `normals` unit vectors in the world (3
-/// floats a point), `colors` red, green, blue (3 bytes a point, 128 where no picture was given). Any of them may be
-/// NULL. `capacity` is the number of points each buffer has room for; SKEP_ERR_CAPACITY when it is less than there are.
+/// Copies the points.
+///
+/// @param cloud      The cloud.
+/// @param positions  Receives 3 * count doubles: x, y, z in the world; may be NULL.
+/// @param normals    Receives 3 * count floats: unit normals in the world; may be NULL.
+/// @param colors     Receives 3 * count bytes: red, green, blue; 128 where no image was given; may be NULL.
+/// @param capacity   Points of room in each buffer.
+/// @retval SKEP_ERR_CAPACITY  `capacity` is below the number of points.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_cloud_get_points(
     cloud: *const skep_cloud,
@@ -65,9 +76,14 @@ pub unsafe extern "C" fn skep_cloud_get_points(
     })
 }
 
-/// Copies the views each point was fused from, the one it started in first: `view_counts` their number for each point
-/// (room for `capacity`), `views` their numbers, point after point (room for `view_capacity`; skep_cloud_get_count says
-/// how many there are). Either may be NULL.
+/// Copies the views that each point was fused from, the one where it started first.
+///
+/// @param cloud          The cloud.
+/// @param view_counts    Receives the number of views of each point, one number a point; may be NULL.
+/// @param capacity       Elements of room in `view_counts`; the number of points is needed.
+/// @param views          Receives the numbers of the views, point after point; may be NULL.
+/// @param view_capacity  Elements of room in `views`; skep_cloud_get_count returns how many are needed.
+/// @retval SKEP_ERR_CAPACITY  A buffer is too small.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_cloud_get_views(
     cloud: *const skep_cloud,

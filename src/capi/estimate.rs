@@ -1,4 +1,4 @@
-//! What is known of one view between two stepper, in C.
+//! Estimates of single views in C.
 
 use super::maps::{self, Plain};
 use super::pointers::{destroy, get, give_list, out, slice, wanted};
@@ -7,31 +7,31 @@ use super::stepper::skep_stepper;
 use crate::pipeline::{AnyEstimate, OwnMaps, ViewEstimate};
 use crate::scene::Maps;
 
-/// What is known of one view after it was searched in a step or, once checked, after the check. Never changes: may be
-/// used from several threads at once.
+/// Planes, costs and view sets of the pixels of one view after a search, or after the check that follows.
+/// Immutable.
 pub struct skep_estimate {
     estimate: AnyEstimate,
 }
 
-/// What a estimate is.
+/// Identity and numbers of an estimate.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct skep_estimate_info {
-    /// The view it is of.
+    /// Number of the view.
     pub view: u32,
-    /// The step it was searched in, or whose scale it was handed up to.
+    /// Number of the cycle it was searched in, or to whose scale it was upsampled.
     pub cycle: u32,
-    /// 1 when it carries the verdicts of a check, else 0.
+    /// 1 for a checked estimate, 0 for a searched one.
     pub is_checked: u32,
     /// Always 0.
     pub reserved: u32,
     /// Number of pixels.
     pub pixels: u64,
-    /// Pixels whose solution the last search changed.
+    /// Pixels whose depth the last search changed by more than 0.1 %.
     pub changed: u64,
-    /// Pixels the last check validated.
+    /// Pixels that the last check validated.
     pub validated: u64,
-    /// NCC evaluations spent on the view so far.
+    /// NCC evaluations of the view so far.
     pub ncc_evaluations: u64,
 }
 
@@ -45,11 +45,25 @@ impl skep_estimate {
     }
 }
 
-/// Makes a estimate from the caller's own maps, as if it had been checked in `step`. The maps have the size that
-/// skep_stepper_get_size tells for that step: `depth` in world units, 0 for none; `normal` unit x, y, z in the camera
-/// frame, facing the camera, where there is a depth. `validated_or_null`: one byte a pixel, not 0 where the solution
-/// counts as validated; NULL validates all that have a depth. `cost_or_null`: at least 0, kept to a 256th, ranks what is
-/// offered to other views; NULL is 0. Strides in bytes; those of NULL maps are ignored.
+/// Makes a checked estimate from the caller's own maps, of the size that skep_stepper_get_size returns.
+///
+/// @param stepper                 The stepper.
+/// @param cycle                   Number of the cycle that the estimate is of.
+/// @param view                    Number of the view.
+/// @param depth                   height rows of width floats: depth in world units, 0 for none; copied.
+/// @param depth_stride_bytes      Bytes from a row of `depth` to the next, at least 4 * width.
+/// @param normal                  height rows of 3 * width floats: x, y, z in the camera frame, a unit vector
+///                                that faces the camera where there is a depth; copied.
+/// @param normal_stride_bytes     Bytes from a row of `normal` to the next, at least 12 * width.
+/// @param validated_or_null       height rows of width bytes, not 0 where the plane is validated, copied;
+///                                NULL: wherever there is a depth.
+/// @param validated_stride_bytes  Bytes from a row to the next, at least width; ignored with NULL.
+/// @param cost_or_null            height rows of width floats, at least 0, rounded to 1/256, copied: ranks
+///                                the planes in the propagation to other views; NULL: 0.
+/// @param cost_stride_bytes       Bytes from a row to the next, at least 4 * width; ignored with NULL.
+/// @param estimate_out            Receives the estimate; destroy it with skep_estimate_destroy.
+/// @retval SKEP_ERR_ARGUMENT  No such cycle or view; a stride that is too small; a depth, normal or cost that
+///                            cannot be used, with its column and row.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_estimate_from_maps(
     stepper: *const skep_stepper,
@@ -99,7 +113,9 @@ unsafe fn optional<T: Plain>(
     (!data.is_null()).then(|| unsafe { maps::read(data, size, stride_bytes, name) }).transpose()
 }
 
-/// Destroys a estimate; NULL is ignored.
+/// Destroys an estimate.
+///
+/// @param estimate  The estimate; NULL is ignored.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_estimate_destroy(estimate: *mut skep_estimate) {
     guard(|| {
@@ -109,7 +125,10 @@ pub unsafe extern "C" fn skep_estimate_destroy(estimate: *mut skep_estimate) {
     });
 }
 
-/// What a estimate is.
+/// Gets the identity and the numbers of an estimate.
+///
+/// @param estimate  The estimate.
+/// @param info_out  Receives them.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_estimate_get_info(
     estimate: *const skep_estimate,
@@ -132,9 +151,15 @@ pub unsafe extern "C" fn skep_estimate_get_info(
     })
 }
 
-/// Copies a estimate's maps, row after row without gaps, `capacity` pixels of room in each: `depth` (1 float a pixel, 0
-/// where there is none), `normal` (3 floats), `cost` (1 float, the aggregated cost of the search, to a
-/// 256th), `validated` (1 byte, 1 where the check validated the solution). Any of them may be NULL.
+/// Copies the maps of an estimate, row after row without gaps.
+///
+/// @param estimate   The estimate.
+/// @param depth      Receives pixels floats: depth in world units, 0 where there is none; may be NULL.
+/// @param normal     Receives 3 * pixels floats: x, y, z in the camera frame; may be NULL.
+/// @param cost       Receives pixels floats: aggregated cost of the search, rounded to 1/256; may be NULL.
+/// @param validated  Receives pixels bytes: 1 where the check validated the plane, else 0; may be NULL.
+/// @param capacity   Pixels of room in each buffer; skep_estimate_get_info returns how many are needed.
+/// @retval SKEP_ERR_CAPACITY  `capacity` is below the number of pixels.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_estimate_get_maps(
     estimate: *const skep_estimate,
@@ -165,10 +190,13 @@ pub unsafe extern "C" fn skep_estimate_get_maps(
     })
 }
 
-/// Saves a estimate as bytes, to keep it or to send it to another machine. `size_out` receives how many there are; with
-/// `buffer` NULL nothing else happens.
+/// Saves an estimate as bytes, to keep it or to send it to another machine.
 ///
-/// SKEP_ERR_CAPACITY: they do not fit into `capacity`.
+/// @param estimate  The estimate.
+/// @param buffer    Receives `*size_out` bytes; may be NULL to ask for their number.
+/// @param capacity  Bytes of room in `buffer`.
+/// @param size_out  Receives the number of bytes.
+/// @retval SKEP_ERR_CAPACITY  `capacity` is too small.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_estimate_save(
     estimate: *const skep_estimate,
@@ -189,9 +217,14 @@ pub unsafe extern "C" fn skep_estimate_save(
     })
 }
 
-/// Loads a estimate that was saved by the same version of the library, for stepper of the same scene and options.
+/// Loads an estimate that the same version of the library saved.
 ///
-/// SKEP_ERR_ARGUMENT: bytes that are no estimate, are cut or too many, or do not fit the stepper.
+/// @param stepper       A stepper of the same scene and options as the one it was made with.
+/// @param bytes         `size` bytes of skep_estimate_save; read during the call only.
+/// @param size          Number of bytes.
+/// @param estimate_out  Receives the estimate; destroy it with skep_estimate_destroy.
+/// @retval SKEP_ERR_ARGUMENT  Bytes that are not an estimate, are truncated or too many, or do not fit the
+///                            stepper.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_estimate_load(
     stepper: *const skep_stepper,

@@ -12,11 +12,17 @@ use crate::io::{self, Workspace};
 use crate::scene::View;
 use std::ffi::c_char;
 
-/// Reads a scene from a folder with images/ and a COLMAP model in sparse/ or sparse/0/, as `colmap image_undistorter`
-/// writes it: text or binary, cameras PINHOLE or SIMPLE_PINHOLE, photographs PNG or JPEG. Paths are in the bytes of the
-/// file system. `near` and `far` are the depth range of every view; (0, 0) takes it from the sparse points.
+/// Reads a scene from a folder with images/ and a COLMAP model in sparse/ or sparse/0/, as `colmap
+/// image_undistorter` writes it: text or binary, cameras PINHOLE or SIMPLE_PINHOLE, images PNG or JPEG.
 ///
-/// SKEP_ERR_FILE: the text names the file, the line where there is one, and what would be right.
+/// @param folder     Path of the folder, in the bytes of the file system.
+/// @param near       Smallest depth of every view in world units; 0 with `far` 0 derives the ranges from the
+///                   sparse points.
+/// @param far        Largest depth of every view in world units.
+/// @param scene_out  Receives the scene; destroy it with skep_scene_destroy.
+/// @retval SKEP_ERR_ARGUMENT  Not 0 < near < far, or a scene that skep_scene_validate refuses.
+/// @retval SKEP_ERR_FILE      A file that is missing or cannot be used; the text names the file, the line
+///                            where there is one, and what was expected.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_scene_read_colmap(
     folder: *const c_char,
@@ -36,10 +42,14 @@ pub unsafe extern "C" fn skep_scene_read_colmap(
     })
 }
 
-/// Writes a scene as a folder that COLMAP and skep_scene_read_colmap read: the photographs as PNG files under their
-/// views' names in images/, and a binary model in sparse/.
+/// Writes a scene as a folder that COLMAP and skep_scene_read_colmap read: images as PNG files under the
+/// names of their views in images/, and a binary model in sparse/.
 ///
-/// SKEP_ERR_ARGUMENT: a view whose name does not end in .png, or would lead out of the folder.
+/// @param scene   The scene.
+/// @param folder  Path of the folder, which is created.
+/// @retval SKEP_ERR_ARGUMENT  A view whose name does not end in .png or leads out of the folder, or a scene
+///                            that skep_scene_validate refuses.
+/// @retval SKEP_ERR_FILE      A file that cannot be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_scene_write_colmap(
     scene: *const skep_scene,
@@ -52,13 +62,16 @@ pub unsafe extern "C" fn skep_scene_write_colmap(
     })
 }
 
-/// Writes what COLMAP calls a dense folder, less images/ and sparse/ (skep_scene_write_colmap writes those, into the
-/// same folder if it is to be a workspace of COLMAP's): for every view of the result depth maps, normal maps and
-/// consistency graphs in stereo/, raw ("photometric") and validated ("geometric"), previews in preview/; the lists of
-/// images that COLMAP wants in stereo/; and fused.ply with fused.ply.vis when there is a cloud. `scene` is the one the
-/// result was made from. Files are whole or not there.
+/// Writes what COLMAP calls a dense folder, except images/ and sparse/, which skep_scene_write_colmap writes:
+/// for every view of the result depth maps, normal maps and consistency graphs in stereo/, raw
+/// ("photometric") and validated ("geometric"), and previews in preview/; the lists of images for COLMAP in
+/// stereo/; fused.ply with fused.ply.vis if there is a cloud. A file appears when it is complete.
 ///
-/// SKEP_ERR_ARGUMENT: another scene, or a view whose name would lead out of the folder.
+/// @param result  The result.
+/// @param scene   The scene that the result was made from.
+/// @param folder  Path of the folder, which is created.
+/// @retval SKEP_ERR_ARGUMENT  Another scene, or a view whose name leads out of the folder.
+/// @retval SKEP_ERR_FILE      A file that cannot be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_result_write_workspace(
     result: *const skep_result,
@@ -93,8 +106,12 @@ pub unsafe extern "C" fn skep_result_write_workspace(
     })
 }
 
-/// Writes a cloud as binary PLY (x, y, z as floats, normals, colors), and the views of each point beside it in
-/// FILE.vis, as COLMAP does.
+/// Writes a cloud as binary PLY (x, y, z as floats, normals, colors), and the views of each point beside it
+/// in FILE.vis, as COLMAP does.
+///
+/// @param cloud  The cloud.
+/// @param file   Path of the file.
+/// @retval SKEP_ERR_FILE  A file that cannot be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_cloud_write_ply(cloud: *const skep_cloud, file: *const c_char) -> skep_status {
     guard(|| {
@@ -104,7 +121,15 @@ pub unsafe extern "C" fn skep_cloud_write_ply(cloud: *const skep_cloud, file: *c
     })
 }
 
-/// Writes a depth map in COLMAP's layout: width floats a row, `stride_bytes` from row to row.
+/// Writes a depth map in COLMAP's layout.
+///
+/// @param file          Path of the file.
+/// @param depth         height rows of width floats: finite depths, 0 for none.
+/// @param width         Width in pixels, 1 to 32768.
+/// @param height        Height in pixels, 1 to 32768.
+/// @param stride_bytes  Bytes from a row of `depth` to the next, at least 4 * width.
+/// @retval SKEP_ERR_ARGUMENT  A size, stride or depth that cannot be used.
+/// @retval SKEP_ERR_FILE      The file cannot be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_write_depth_map(
     file: *const c_char,
@@ -126,7 +151,15 @@ pub unsafe extern "C" fn skep_write_depth_map(
     })
 }
 
-/// Writes a normal map in COLMAP's layout: x, y, z of each pixel, 3 * width floats a row, `stride_bytes` from row to row.
+/// Writes a normal map in COLMAP's layout.
+///
+/// @param file          Path of the file.
+/// @param normal        height rows of 3 * width floats: x, y, z of each pixel, finite.
+/// @param width         Width in pixels, 1 to 32768.
+/// @param height        Height in pixels, 1 to 32768.
+/// @param stride_bytes  Bytes from a row of `normal` to the next, at least 12 * width.
+/// @retval SKEP_ERR_ARGUMENT  A size, stride or normal that cannot be used.
+/// @retval SKEP_ERR_FILE      The file cannot be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_write_normal_map(
     file: *const c_char,
@@ -150,8 +183,18 @@ pub unsafe extern "C" fn skep_write_normal_map(
     })
 }
 
-/// Writes a consistency graph in COLMAP's layout: `counts` holds the number of views of each of the width * height
-/// pixels, `views` their numbers, pixel after pixel, `view_total` in all. Pixels without any are left out of the file.
+/// Writes a consistency graph in COLMAP's layout: the views that each pixel is consistent with. Pixels
+/// without any are left out of the file.
+///
+/// @param file        Path of the file.
+/// @param width       Width in pixels, 1 to 32768.
+/// @param height      Height in pixels, 1 to 32768.
+/// @param counts      width * height numbers: how many views each pixel has.
+/// @param views       `view_total` numbers of views, pixel after pixel.
+/// @param view_total  Sum of `counts`.
+/// @retval SKEP_ERR_ARGUMENT  A size that cannot be used, a `view_total` that is not the sum of `counts`, or
+///                            a number above 2^31 - 1.
+/// @retval SKEP_ERR_FILE      The file cannot be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_write_consistency_graph(
     file: *const c_char,
@@ -186,8 +229,15 @@ pub unsafe extern "C" fn skep_write_consistency_graph(
     })
 }
 
-/// Reads a depth map in COLMAP's layout, row after row without gaps. `width_out` and `height_out` receive its size; with
-/// `depth` NULL nothing else happens, else `capacity` is the number of floats it has room for, at least width * height.
+/// Reads a depth map in COLMAP's layout, row after row without gaps.
+///
+/// @param file        Path of the file.
+/// @param depth       Receives width * height floats; may be NULL to ask for the size.
+/// @param capacity    Elements of room in `depth`.
+/// @param width_out   Receives the width in pixels.
+/// @param height_out  Receives the height in pixels.
+/// @retval SKEP_ERR_FILE      A file that is missing, truncated or in another layout.
+/// @retval SKEP_ERR_CAPACITY  `capacity` is below width * height.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_read_depth_map(
     file: *const c_char,
@@ -211,8 +261,16 @@ pub unsafe extern "C" fn skep_read_depth_map(
     })
 }
 
-/// Reads a normal map in COLMAP's layout, x, y, z of each pixel, row after row without gaps; see skep_read_depth_map.
-/// `capacity` is the number of floats, at least 3 * width * height.
+/// Reads a normal map in COLMAP's layout, row after row without gaps.
+///
+/// @param file        Path of the file.
+/// @param normal      Receives 3 * width * height floats: x, y, z of each pixel; may be NULL to ask for the
+///                    size.
+/// @param capacity    Elements of room in `normal`.
+/// @param width_out   Receives the width in pixels.
+/// @param height_out  Receives the height in pixels.
+/// @retval SKEP_ERR_FILE      A file that is missing, truncated or in another layout.
+/// @retval SKEP_ERR_CAPACITY  `capacity` is below 3 * width * height.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_read_normal_map(
     file: *const c_char,
@@ -235,9 +293,20 @@ pub unsafe extern "C" fn skep_read_normal_map(
     })
 }
 
-/// Reads a consistency graph in COLMAP's layout: the number of views of each pixel into `counts` (room for
-/// `count_capacity`, at least width * height) and their numbers, pixel after pixel, into `views` (room for
-/// `view_capacity`). `view_total_out` receives the number of those; `counts` and `views` may be NULL to only ask.
+/// Reads a consistency graph in COLMAP's layout.
+///
+/// @param file            Path of the file.
+/// @param counts          Receives width * height numbers: how many views each pixel has; may be NULL to ask
+///                        for the size.
+/// @param count_capacity  Elements of room in `counts`.
+/// @param views           Receives `*view_total_out` numbers of views, pixel after pixel; may be NULL to ask
+///                        for their number.
+/// @param view_capacity   Elements of room in `views`.
+/// @param width_out       Receives the width in pixels.
+/// @param height_out      Receives the height in pixels.
+/// @param view_total_out  Receives the sum of `counts`.
+/// @retval SKEP_ERR_FILE      A file that is missing, truncated or in another layout.
+/// @retval SKEP_ERR_CAPACITY  A buffer is too small.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_read_consistency_graph(
     file: *const c_char,

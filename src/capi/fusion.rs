@@ -16,30 +16,31 @@ use crate::scene::Maps;
 use std::ffi::c_void;
 use std::sync::Arc;
 
-/// A view with maps to be fused, in the caller's memory, which is only read, and only during the call. This struct
-/// never changes.
+/// A view with maps to be fused, in the caller's memory, read during the call only. The layout of this struct
+/// is frozen.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct skep_fusion_view {
-    /// The camera of the maps.
+    /// Camera of the maps.
     pub camera: *const skep_camera,
-    /// Width of the maps.
+    /// Width of the maps, 1 to 32768.
     pub width: u32,
-    /// Height of the maps.
+    /// Height of the maps, 1 to 32768.
     pub height: u32,
-    /// Depth of each pixel; one that is not a finite number above 0 is no estimate.
+    /// height rows of width floats: depth in world units; 0, negative and not finite: no estimate.
     pub depth: *const f32,
-    /// Bytes from row to row of `depth`, at least 4 * width.
+    /// Bytes from a row of `depth` to the next, at least 4 * width.
     pub depth_stride_bytes: usize,
-    /// Normal of each pixel in the camera frame, x, y, z.
+    /// height rows of 3 * width floats: unit normals x, y, z in the camera frame.
     pub normal: *const f32,
-    /// Bytes from row to row of `normal`, at least 12 * width.
+    /// Bytes from a row of `normal` to the next, at least 12 * width.
     pub normal_stride_bytes: usize,
-    /// For the colors, of the maps' size; NULL gives gray points.
+    /// Image of the size of the maps, for the colors; NULL: gray points.
     pub image_or_null: *const skep_image,
-    /// The views that may see the same surface, as indices into the list of views; see skep_scene_get_overlap.
+    /// Views that may observe the same surface, as indices into the array of views; see
+    /// skep_scene_get_overlap.
     pub overlap: *const u32,
-    /// Number of those.
+    /// Number of elements of `overlap`.
     pub overlap_count: usize,
 }
 
@@ -87,10 +88,19 @@ impl skep_fusion_view {
     }
 }
 
-/// Fuses maps into points, with the "fusion." options and "threads". Results of a run fused with their validated maps,
-/// images and overlaps give the run's own cloud to the bit.
+/// Fuses depth and normal maps into points, with the options of group "fusion" and "threads". The validated
+/// maps of a whole run with its images and overlaps give the cloud of the run, to the bit.
 ///
-/// SKEP_ERR_ARGUMENT: a camera, size, stride, image or overlap that makes no sense, named like "views[2].depth".
+/// @param views             `view_count` views with their maps; read during the call only.
+/// @param view_count        Number of views.
+/// @param options_or_null   The options; NULL: the default preset.
+/// @param progress_or_null  Receives the progress and may cancel; NULL: none.
+/// @param user              Passed to the callback; may be NULL.
+/// @param cloud_out         Receives the cloud; destroy it with skep_cloud_destroy. Not written when the call
+///                          fails.
+/// @retval SKEP_ERR_ARGUMENT   A camera, size, stride, image or overlap that cannot be used, named like
+///                             `views[2].depth`; options out of range.
+/// @retval SKEP_ERR_CANCELLED  The callback returned non-zero.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_fuse(
     views: *const skep_fusion_view,

@@ -5,35 +5,35 @@ use crate::geometry::Camera;
 use crate::image::Picture;
 use std::ffi::c_void;
 
-/// Gray. An image's format is a layout, of 8 bits a channel, plus a depth when it is another: SKEP_FORMAT_BGR is 8-bit
-/// BGR, SKEP_FORMAT_BGR + SKEP_FORMAT_16 is 16-bit BGR.
+/// Gray. A format is a layout of channels of 8 bits, plus SKEP_FORMAT_16 or SKEP_FORMAT_FLOAT for other
+/// channels: SKEP_FORMAT_BGR is 8-bit BGR, SKEP_FORMAT_BGR + SKEP_FORMAT_16 is 16-bit BGR.
 pub const SKEP_FORMAT_GRAY: u32 = 0;
 /// Red, green, blue.
 pub const SKEP_FORMAT_RGB: u32 = 1;
-/// Blue, green, red, as OpenCV has it.
+/// Blue, green, red: the order of OpenCV.
 pub const SKEP_FORMAT_BGR: u32 = 2;
 /// Red, green, blue, and a fourth channel that is ignored.
 pub const SKEP_FORMAT_RGBA: u32 = 3;
 /// Blue, green, red, and a fourth channel that is ignored.
 pub const SKEP_FORMAT_BGRA: u32 = 4;
-/// Added to a layout: uint16_t in the machine's byte order, 0 to 65535.
+/// Added to a layout: channels of uint16_t in the machine's byte order, 0 to 65535.
 pub const SKEP_FORMAT_16: u32 = 16;
-/// Added to a layout: float, 0 to 1; values beyond are clamped.
+/// Added to a layout: channels of float, 0 to 1; values outside are clamped, NaN is refused.
 pub const SKEP_FORMAT_FLOAT: u32 = 32;
 
-/// Pixels in the caller's memory, which is only read, and only during the call. This struct never changes.
+/// Pixels in the caller's memory, read during the call only. The layout of this struct is frozen.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct skep_image {
-    /// The top-left pixel. 16-bit and float pixels need no alignment.
+    /// Address of the top-left pixel; needs no alignment.
     pub data: *const c_void,
-    /// Pixels of a row, 1 to 32768.
+    /// Width in pixels, 1 to 32768.
     pub width: u32,
-    /// Rows, 1 to 32768.
+    /// Height in pixels, 1 to 32768.
     pub height: u32,
-    /// Bytes from a row to the next, at least those of a row's pixels; bytes between rows are not touched.
+    /// Bytes from a row to the next, at least those of the pixels of a row.
     pub stride_bytes: usize,
-    /// Layout plus depth, from the SKEP_FORMAT_ values.
+    /// A SKEP_FORMAT_ layout, plus SKEP_FORMAT_16 or SKEP_FORMAT_FLOAT.
     pub format: u32,
 }
 
@@ -102,9 +102,8 @@ fn format(format: u32, name: &str) -> Result<(Layout, Depth), Failure> {
 
 /// The bytes of an image's rows, each without what lies between rows.
 ///
-/// # Safety
-/// `data` is NULL or points to `height` rows of `row_bytes` readable bytes, `stride_bytes` apart, that stay as they are
-/// for `'a`.
+/// # Safety `data` is NULL or points to `height` rows of `row_bytes` readable bytes, `stride_bytes` apart,
+/// that stay as they are for `'a`.
 pub unsafe fn rows<'a>(
     data: *const c_void,
     row_bytes: usize,

@@ -1,4 +1,4 @@
-//! The kernels in C: plane-induced homographies and patch correlation, alone and in batches.
+//! The kernels in C: plane-induced homographies and NCC of patches, in batches.
 
 use super::camera::skep_camera;
 use super::image::skep_image;
@@ -11,31 +11,39 @@ use crate::simd::{Simd, SimdLevel, Task, dispatch};
 use glam::{DVec2, DVec3, Vec3};
 use std::mem::MaybeUninit;
 
-/// A gray image in the layout the kernels sample. Never changes: may be used from several threads at once.
+/// A gray image in the memory layout that the kernels sample. Immutable.
+///
+/// The kernels are stateless: they may be called from any number of threads. skep_plane_through,
+/// skep_plane_homographies and skep_patch_ncc allocate no memory.
 pub struct skep_packed_image {
     image: PackedImage,
 }
 
-/// Where patches are sampled and how samples are weighted. Never changes: may be used from several threads at once.
+/// Sample positions of a patch and their weights. Immutable.
 pub struct skep_ncc_window {
     window: Window,
     level: SimdLevel,
 }
 
-/// A plane in the reference camera's frame: normal . X = -distance, with a unit normal that faces the camera and a
-/// distance above 0. This struct never changes.
+/// A plane in the frame of a camera, normal . X = -distance. The layout of this struct is frozen.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct skep_plane {
-    /// Unit normal.
+    /// Unit normal that faces the camera.
     pub normal: [f64; 3],
-    /// Distance from the camera's center.
+    /// Distance from the center of the camera in world units, above 0.
     pub distance: f64,
 }
 
-/// The plane with this unit normal through the point at `depth` behind a pixel, which need not be whole.
+/// Makes the plane with a given normal through the point of a pixel at a given depth.
 ///
-/// Stateless, like all kernels here: any number of threads, no allocation.
+/// @param camera     The camera.
+/// @param x          Column of the pixel; may be fractional.
+/// @param y          Row of the pixel; may be fractional.
+/// @param depth      Depth of the point in world units, above 0.
+/// @param normal     3 doubles: unit normal in the camera frame that faces the camera (n . ray < 0).
+/// @param plane_out  Receives the plane in the camera frame.
+/// @retval SKEP_ERR_ARGUMENT  A camera, coordinate, depth or normal that cannot be used.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_plane_through(
     camera: *const skep_camera,
@@ -90,9 +98,15 @@ impl skep_plane {
     }
 }
 
-/// The homographies that planes induce from pixels of one camera to pixels of another, H = K' (R - t n^T / D) K^-1
-/// (equation 2 of the paper): 9 doubles each, row by row, so that (x', y', 1) ~ H (x, y, 1). `homographies` has room
-/// for 9 * count doubles.
+/// Computes the homographies that planes induce from the pixels of one camera to those of another, H = K' (R
+/// - t n^T / D) K^-1 (equation 2 of the paper), so that (x', y', 1) ~ H (x, y, 1).
+///
+/// @param reference     The camera in whose frame the planes are.
+/// @param source        The other camera.
+/// @param planes        `count` planes.
+/// @param count         Number of planes.
+/// @param homographies  Receives 9 * count doubles: each matrix row by row; may be NULL when `count` is 0.
+/// @retval SKEP_ERR_ARGUMENT  A camera or plane that cannot be used.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_plane_homographies(
     reference: *const skep_camera,
@@ -132,7 +146,12 @@ fn check_item(index: usize, check: impl Fn(&str) -> Result<(), Failure>, list: &
     check("").or_else(|_| check(&format!("{list}[{index}]")))
 }
 
-/// Copies an image into the layout the kernels sample; colors become gray as in skep_scene_add_view.
+/// Copies an image into the memory layout that the kernels sample. Colors are converted to gray as in
+/// skep_scene_add_view.
+///
+/// @param image             The pixels.
+/// @param packed_image_out  Receives the packed image; destroy it with skep_packed_image_destroy.
+/// @retval SKEP_ERR_ARGUMENT  A size, stride, format or float pixel that cannot be used.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_packed_image_create(
     image: *const skep_image,
@@ -147,7 +166,9 @@ pub unsafe extern "C" fn skep_packed_image_create(
     })
 }
 
-/// Destroys samples; NULL is ignored.
+/// Destroys a packed image.
+///
+/// @param packed_image  The packed image; NULL is ignored.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_packed_image_destroy(packed_image: *mut skep_packed_image) {
     guard(|| {
@@ -157,12 +178,21 @@ pub unsafe extern "C" fn skep_packed_image_destroy(packed_image: *mut skep_packe
     });
 }
 
-/// Makes a square window of half side `radius` (1 to 16), sampled every `step` pixels (1 to 8). A sample weighs
-/// exp(-r^2 / (2 sigma_spatial^2) - dI^2 / (2 sigma_color^2)), with r its distance from the center in pixels and dI its
-/// difference in gray from it, of [0, 1]; INFINITY for both sigmas weighs all samples alike. `min_variance`: weighted
-/// variance, of gray in [0, 1], under which a patch has no texture; 1e-5 suits photographs.
+/// Creates a square window of samples. A sample weighs exp(-r^2 / (2 sigma_spatial^2) - dI^2 / (2
+/// sigma_color^2)), with r its distance from the center in pixels and dI its difference in gray value from
+/// the center, of [0, 1].
 ///
-/// The instruction set is the one skep_simd_level_name tells when the window is made.
+/// The window keeps the instruction set that skep_simd_level_name returns at this moment.
+///
+/// @param radius          Half the side of the window in pixels, 1 to 16.
+/// @param step            Distance between samples in pixels, 1 to 8.
+/// @param sigma_spatial   Sigma of the weight in space in pixels, at least 0.001; INFINITY: no such weight.
+/// @param sigma_color     Sigma of the weight in gray value, of [0, 1], at least 0.001; INFINITY: no such
+///                        weight.
+/// @param min_variance    Weighted variance of gray values below which a patch has no texture, 0 to 1; 1e-5
+///                        suits photographs.
+/// @param ncc_window_out  Receives the window; destroy it with skep_ncc_window_destroy.
+/// @retval SKEP_ERR_ARGUMENT  A number out of its range.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_ncc_window_create(
     radius: u32,
@@ -196,7 +226,9 @@ pub unsafe extern "C" fn skep_ncc_window_create(
     })
 }
 
-/// Destroys a window; NULL is ignored.
+/// Destroys a window.
+///
+/// @param window  The window; NULL is ignored.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_ncc_window_destroy(window: *mut skep_ncc_window) {
     guard(|| {
@@ -206,14 +238,23 @@ pub unsafe extern "C" fn skep_ncc_window_destroy(window: *mut skep_ncc_window) {
     });
 }
 
-/// Normalized cross-correlations of patches of the reference with their images in a source view: `pixels` holds x, y of
-/// each patch's center in the reference (2 * count), `homographies` the way of each from reference to source pixels (9
-/// doubles each, row by row), `ncc` has room for count floats. -1 to 1; -1 also where either side has no texture. Samples
-/// outside the reference weigh nothing, those outside the source repeat its border. The source is interpolated bilinearly
-/// at places in 256ths of a pixel, so an NCC differs from the exact one by some 1e-4.
+/// Computes the normalized cross-correlation (NCC) of patches of the reference image with the patches of the
+/// source image that homographies map them to. Samples outside of the reference image have no weight; outside
+/// of the source image its border is repeated. The source is interpolated bilinearly at positions rounded to
+/// 1/256 pixel, so that an NCC differs from the exact one by some 1e-4.
 ///
-/// Patches that follow each other at the same pixel share the reference's side: sort them so. Stateless: any number of
-/// threads, no allocation.
+/// Consecutive patches at the same pixel share the samples of the reference: sort by pixel.
+///
+/// @param window        The window.
+/// @param reference     The reference image.
+/// @param source        The source image.
+/// @param pixels        2 * count numbers: x, y of the center of each patch in the reference image.
+/// @param homographies  9 * count doubles: maps pixels of the reference to pixels of the source, row by row,
+///                      one for each patch.
+/// @param count         Number of patches.
+/// @param ncc           Receives `count` floats from -1 to 1; -1 also where either patch has no texture; may
+///                      be NULL when `count` is 0.
+/// @retval SKEP_ERR_ARGUMENT  A pixel outside of the reference image, or a homography that is not finite.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_patch_ncc(
     window: *const skep_ncc_window,

@@ -1,6 +1,6 @@
-//! Where the fields of the interface's structs lie, which compiled programs rely on. `ffi-tests/header/layout.inc`
-//! holds it; the test here compares that with what Rust makes of the source, a C program with what C makes of the
-//! header. `SKEP_UPDATE_HEADER=1 cargo test layout` writes it anew.
+//! Where the fields of the interface's structs lie, which compiled programs rely on.
+//! `ffi-tests/header/layout.inc` holds it; the test here compares that with what Rust makes of the source, a
+//! C program with what C makes of the header. `SKEP_UPDATE_HEADER=1 cargo test layout` writes it anew.
 
 use super::camera::skep_camera;
 use super::estimate::skep_estimate_info;
@@ -43,8 +43,8 @@ macro_rules! layout {
 }
 
 layout! {
-    skep_image { data, width, height, stride_bytes, format }
     skep_camera { fx, fy, cx, cy, rotation, translation }
+    skep_image { data, width, height, stride_bytes, format }
     skep_progress { done, phase, downscale, cycle, view, view_count }
     skep_statistics { ncc_evaluations, bilinear_samples, early_terminations, status_counts }
     skep_cycle_record { downscale, cycle, pixels, changed, validated }

@@ -4,7 +4,7 @@ use super::image::{check_rows, rows};
 use super::status::Failure;
 use std::ffi::c_void;
 
-/// Values of a kind that any bits of its size make.
+/// Types of which every bit pattern is a value.
 pub trait Plain: Copy + Default {}
 impl Plain for f32 {}
 impl Plain for u8 {}

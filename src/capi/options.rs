@@ -1,19 +1,22 @@
-//! Options in C: by name, so that an option more breaks nobody.
+//! Options in C: by name, so that a new option is compatible.
 
-use super::pointers::{self, destroy, get, out, text};
-use super::scene::give_text;
+use super::pointers::{self, destroy, get, give_text, out, text};
 use super::status::{Failure, guard, skep_status};
 use crate::options::{OptionValue, Options};
 use std::ffi::c_char;
 use std::sync::RwLock;
 
-/// Every number the method depends on. May be used from several threads at once.
+/// Every number the method depends on, by name.
 pub struct skep_options {
     pub(super) options: RwLock<Options>,
 }
 
-/// Makes options from a preset: "default" (or NULL), which measures best, "fast", which takes less than half of
-/// its time, or "paper", which follows the paper to the letter.
+/// Creates options from a preset.
+///
+/// @param preset_or_null  "default" (also NULL): most accurate; "fast": less than half of its time; "paper":
+///                        follows the paper literally.
+/// @param options_out     Receives the options; destroy them with skep_options_destroy.
+/// @retval SKEP_ERR_ARGUMENT  No preset of this name.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_options_create(
     preset_or_null: *const c_char,
@@ -32,7 +35,9 @@ pub unsafe extern "C" fn skep_options_create(
     })
 }
 
-/// Destroys options; NULL is ignored. Runs that were started with them are not touched.
+/// Destroys options. Runs and steppers that were created with them are not affected.
+///
+/// @param options  The options; NULL is ignored.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_options_destroy(options: *mut skep_options) {
     guard(|| {
@@ -42,10 +47,15 @@ pub unsafe extern "C" fn skep_options_destroy(options: *mut skep_options) {
     });
 }
 
-/// Sets an option that is a number. Switches are 0 or 1; whole numbers must be whole. The list of options above explains
-/// each; where a name is the only one without its group, it may be left out.
+/// Sets an option that is a number, a whole number or a switch.
 ///
-/// SKEP_ERR_ARGUMENT: no option of this name, or one that is a text, or a value out of its range.
+/// @param options  The options.
+/// @param name     Name of the option; the group may be left out where no other group has an option of this
+///                 name.
+/// @param value    The value in the unit of the option; 0 or 1 for a switch. Whole numbers are exact up to
+///                 2^53.
+/// @retval SKEP_ERR_ARGUMENT  No option of this name, several, one that is a text, or a value out of its
+///                            range.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_options_set(
     options: *mut skep_options,
@@ -59,9 +69,12 @@ pub unsafe extern "C" fn skep_options_set(
     })
 }
 
-/// Gets an option that is a number; switches are 0 or 1.
+/// Gets an option that is a number, a whole number or a switch.
 ///
-/// SKEP_ERR_ARGUMENT: no option of this name, or one that is a text.
+/// @param options    The options.
+/// @param name       Name of the option, as in skep_options_set.
+/// @param value_out  Receives the value; 0 or 1 for a switch.
+/// @retval SKEP_ERR_ARGUMENT  No option of this name, several, or one that is a text.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_options_get(
     options: *const skep_options,
@@ -86,10 +99,13 @@ pub unsafe extern "C" fn skep_options_get(
     })
 }
 
-/// Sets any option from its text: a number, "true" or "false", a name, or a schedule such as
-/// "downscale=2 food_sources=3 iterations=5+4x1; downscale=1 food_sources=2 iterations=1+2x1".
+/// Sets any option from its text.
 ///
-/// SKEP_ERR_ARGUMENT: no option of this name, or a text or value that it does not take.
+/// @param options  The options.
+/// @param name     Name of the option, as in skep_options_set.
+/// @param value    A number, "true" or "false", a name, or a schedule such as "downscale=2 food_sources=3
+///                 iterations=5+4x1; downscale=1 food_sources=2 iterations=1+2x1".
+/// @retval SKEP_ERR_ARGUMENT  No option of this name, several, or a text or value that it does not accept.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_options_set_text(
     options: *mut skep_options,
@@ -104,9 +120,14 @@ pub unsafe extern "C" fn skep_options_set_text(
     })
 }
 
-/// Copies the text of any option, which skep_options_set_text takes; see skep_scene_get_name for the buffer.
+/// Copies the text of any option, in the form that skep_options_set_text accepts.
 ///
-/// SKEP_ERR_ARGUMENT: no option of this name.
+/// @param options     The options.
+/// @param name        Name of the option, as in skep_options_set.
+/// @param buffer      Receives up to `capacity` bytes, the last one NUL; may be NULL to ask for the size.
+/// @param capacity    Bytes of room in `buffer`; a longer text is cut.
+/// @param needed_out  Receives the bytes of the whole text with its NUL; may be NULL.
+/// @retval SKEP_ERR_ARGUMENT  No option of this name, or several.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_options_get_text(
     options: *const skep_options,
@@ -124,13 +145,16 @@ pub unsafe extern "C" fn skep_options_get_text(
     })
 }
 
-/// The name of the option with this index, counted from 0; static. NULL after the last.
+/// Lists the options.
+///
+/// @param index  Index of the option, from 0.
+/// @return Name of the option with its group, a static text; NULL after the last.
 #[unsafe(no_mangle)]
 pub extern "C" fn skep_option_name(index: usize) -> *const c_char {
     Options::c_name(index).map_or(std::ptr::null(), |name| name.as_ptr())
 }
 
-/// The options of a call: the caller's, or the default preset where there are none.
+/// The options of a call; NULL is the default preset.
 ///
 /// # Safety
 /// `options` is NULL or points to options.

@@ -1,4 +1,4 @@
-//! From C's pointers to references, with everything checked that can be.
+//! From C's pointers to references, with all checks that are possible.
 
 use super::status::{Failure, SKEP_ERR_CAPACITY, SKEP_ERR_NULL, SKEP_ERR_POISONED};
 use std::ffi::{CStr, OsStr, c_char};
@@ -123,8 +123,8 @@ impl<T: Copy> OutSlice<T> {
     /// Writes the values, of which there are as many as room was asked for.
     pub fn set(self, values: &[T]) {
         if !values.is_empty() {
-            // SAFETY: `out_slice` checked pointer and capacity, and was promised that there is memory; the values
-            // are the library's own and do not overlap it.
+            // SAFETY: `out_slice` checked pointer and capacity, and was promised that there is memory; the
+            // values are the library's own and do not overlap it.
             unsafe { self.0.copy_from_nonoverlapping(values.as_ptr(), values.len()) }
         }
     }
@@ -144,8 +144,8 @@ pub unsafe fn wanted<T: Copy>(
     (!pointer.is_null()).then(|| unsafe { out_slice(pointer, capacity, needed, name) }).transpose()
 }
 
-/// A list of values for a caller who may only want to know how many there are: nothing is copied into NULL. `names`
-/// are those of `pointer` and `count`.
+/// Copies a list of values, or only returns their number where `pointer` is NULL. The names are those of
+/// `pointer` and `count`.
 ///
 /// # Safety
 /// `pointer` is NULL or points to memory for `capacity` values; `count` is NULL or points to memory for one.
@@ -202,7 +202,8 @@ pub unsafe fn path<'a>(path: *const c_char, name: &str) -> Result<&'a Path, Fail
     }
 }
 
-/// Copies a text with its NUL, cut between characters where it is too long; returns the bytes the whole of it takes.
+/// Copies a text with its NUL, cut between characters where it is too long; returns the bytes the whole of it
+/// takes.
 ///
 /// # Safety
 /// `buffer` is NULL or points to `capacity` writable bytes.
@@ -218,6 +219,25 @@ pub unsafe fn copy_text(text: &str, buffer: *mut c_char, capacity: usize) -> usi
         }
     }
     text.len() + 1
+}
+
+/// [`copy_text`] with the number of bytes in `needed`, which may be NULL.
+///
+/// # Safety
+/// `buffer` is NULL or points to `capacity` writable bytes, `needed` is NULL or points to memory for a size.
+pub unsafe fn give_text(
+    text: &str,
+    buffer: *mut c_char,
+    capacity: usize,
+    needed: *mut usize,
+) -> Result<(), Failure> {
+    // SAFETY: as promised by the caller.
+    unsafe {
+        let place = wanted_one(needed, "needed_out")?;
+        let length = copy_text(text, buffer, capacity);
+        place.into_iter().for_each(|place| place.set(length));
+    }
+    Ok(())
 }
 
 /// The inside of an object that changes; refused once a call that changed it panicked.

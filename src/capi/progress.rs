@@ -1,4 +1,4 @@
-//! How C follows a run and stops it.
+//! Progress and cancellation in C.
 
 use crate::parallel::{Phase, Progress};
 use std::ffi::c_void;
@@ -7,42 +7,46 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Bees search the solutions of a view.
+/// Search of the planes of a view.
 pub const SKEP_PHASE_SEARCH: u32 = 0;
-/// Views check each other's solutions.
+/// Checks between views.
 pub const SKEP_PHASE_CHECK: u32 = 1;
-/// Maps become points.
+/// Fusion of maps into points.
 pub const SKEP_PHASE_FUSION: u32 = 2;
 
-/// Where a call stands.
+/// Progress of a call.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct skep_progress {
-    /// Share of the whole call that is done, 0 to 1.
+    /// Fraction of the work of the call that is done, 0 to 1.
     pub done: f64,
-    /// What is being done: a SKEP_PHASE_ value.
+    /// Stage of the call: a SKEP_PHASE_ value.
     pub phase: u32,
-    /// Size of the images searched: 1 is full, 2 half, 4 a quarter.
+    /// Scale of the images: 1 is full size, 2 half, 4 a quarter.
     pub downscale: u32,
-    /// The cycle on this scale, counted from 0.
+    /// Number of the cycle on this scale, from 0.
     pub cycle: u32,
-    /// The view at work.
+    /// Number of the view that is worked on.
     pub view: u32,
     /// Number of views.
     pub view_count: u32,
 }
 
-/// The host's callback: called about a hundred times a second, never twice at the same time, but from any thread of
-/// the library. Non-zero cancels the call it is handed to, which then returns SKEP_ERR_CANCELLED, in general within
-/// 100 ms. It must return soon, must not throw or unwind, and must not destroy what the call uses. NULL is a host that
-/// neither looks nor stops.
+/// Progress callback of the host. It is called about a hundred times a second from any thread of the library,
+/// never twice at the same time for one call. Returning non-zero cancels the call, which then returns
+/// SKEP_ERR_CANCELLED, usually within 100 ms. The callback must return soon, must not throw or unwind, and
+/// must not destroy objects that the call uses. NULL: no callback.
+///
+/// @param user      The pointer that was passed to the call.
+/// @param progress  Progress of the call; valid during the callback only.
+/// @return 0 to continue, non-zero to cancel.
 pub type skep_progress_fn =
     Option<unsafe extern "C" fn(user: *mut c_void, progress: *const skep_progress) -> i32>;
 
 /// Time between two calls of the host.
 const INTERVAL: Duration = Duration::from_millis(10);
 
-/// A host's callback with what it wants to have handed back.
+/// The callback of a host with its user pointer.
 pub struct Host {
     callback: skep_progress_fn,
     user: *mut c_void,

@@ -1,11 +1,10 @@
-//! A whole run in C, and what it hands out for each view.
+//! Whole runs in C, and the maps of their results.
 
 use super::cloud::skep_cloud;
-use super::maps::{self, Plain};
 use super::options::{options_or_default, skep_options};
-use super::pointers::{destroy, get, give_list, out};
+use super::pointers::{destroy, get, give_list, give_text, out};
 use super::progress::{Host, skep_progress_fn};
-use super::scene::{give_text, skep_scene};
+use super::scene::skep_scene;
 use super::status::{Failure, guard, skep_status};
 use crate::fusion::PointCloud;
 use crate::pipeline::ViewResult;
@@ -15,8 +14,7 @@ use std::collections::BTreeMap;
 use std::ffi::{c_char, c_void};
 use std::sync::Arc;
 
-/// Maps of views, and the cloud when they come from a whole run. Never changes: may be used from several threads at
-/// once.
+/// Maps of views, and the cloud of a whole run. Immutable.
 pub struct skep_result {
     /// By the view's number in the scene.
     pub(super) views: BTreeMap<u32, ViewResult>,
@@ -24,51 +22,52 @@ pub struct skep_result {
     warnings: Vec<String>,
 }
 
-/// The raw estimate of every pixel.
+/// The planes of all pixels.
 pub const SKEP_MAPS_RAW: u32 = 0;
-/// What was validated by other views; the rest is empty.
+/// The planes of validated pixels; the others are 0.
 pub const SKEP_MAPS_VALIDATED: u32 = 1;
 
-/// The solution is consistent with enough source views.
+/// The plane is consistent with enough source views.
 pub const SKEP_PIXEL_VALIDATED: u8 = 0;
-/// The mask leaves the pixel out.
+/// The mask excludes the pixel.
 pub const SKEP_PIXEL_MASKED: u8 = 1;
-/// The window around the pixel is too uniform to be matched.
+/// The variance in the window around the pixel is too small for matching.
 pub const SKEP_PIXEL_NO_TEXTURE: u8 = 2;
-/// Fewer than two source views can see the solution.
+/// The plane is visible in fewer than two source views.
 pub const SKEP_PIXEL_NO_SOURCES: u8 = 3;
-/// Too few source views agree with the solution.
+/// Too few source views are consistent with the plane.
 pub const SKEP_PIXEL_INCONSISTENT: u8 = 4;
-/// The solution lies at an end of the depth range: the surface may lie beyond.
+/// The depth is at an end of the depth range: the surface may lie outside of it.
 pub const SKEP_PIXEL_OUT_OF_RANGE: u8 = 5;
 
-/// What a view cost and what became of its pixels. Counts depend on input and options only, not on the machine.
+/// Work spent on a view, and status of its pixels. The numbers depend on input and options only, not on the
+/// machine.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct skep_statistics {
-    /// Patches compared with a patch in one source view.
+    /// Comparisons of a patch with its image in one source view.
     pub ncc_evaluations: u64,
     /// Bilinear samples taken from source views.
     pub bilinear_samples: u64,
-    /// Hypotheses given up before all their source views were looked at.
+    /// Plane evaluations that ended before all source views were compared.
     pub early_terminations: u64,
-    /// Number of pixels of each SKEP_PIXEL_ value; those beyond the last are 0.
+    /// Number of pixels of each SKEP_PIXEL_ value; entries after the last value are 0.
     pub status_counts: [u64; 8],
 }
 
-/// One cycle's search of one view.
+/// Search and check of one view in one cycle.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct skep_cycle_record {
-    /// Size of the images: 1 is full, 2 half, 4 a quarter.
+    /// Scale of the images: 1 is full size, 2 half, 4 a quarter.
     pub downscale: u32,
-    /// The cycle on that scale, counted from 0.
+    /// Number of the cycle on that scale, from 0.
     pub cycle: u32,
-    /// Pixels searched.
+    /// Pixels with a plane.
     pub pixels: u64,
-    /// Pixels whose solution changed.
+    /// Pixels whose depth the search changed by more than 0.1 %.
     pub changed: u64,
-    /// Pixels validated by the check after it.
+    /// Pixels that the check validated.
     pub validated: u64,
 }
 
@@ -97,13 +96,21 @@ impl skep_result {
     }
 }
 
-/// Estimates depth, normal and source views of every pixel of every view, and fuses what was validated.
+/// Estimates depth, normal and view set of every pixel of every view, and fuses the validated pixels into
+/// points.
 ///
-/// Runs on threads of its own (option "threads"), which have ended when it returns; any number of runs may go on at the
-/// same time. The same scene, options and library version give the same bits for any number of threads and any
-/// instruction set. When it is cancelled or fails, `result_out` is not written.
+/// A run has its own threads (option "threads"), which have ended when the call returns; several runs may be
+/// made at the same time.
 ///
-/// SKEP_ERR_ARGUMENT: the scene is not in order (see skep_scene_validate) or an option is out of range.
+/// @param scene             The scene, as it is when the call starts.
+/// @param options_or_null   The options; NULL: the default preset.
+/// @param progress_or_null  Receives the progress and may cancel; NULL: none.
+/// @param user              Passed to the callback; may be NULL.
+/// @param result_out        Receives the result; destroy it with skep_result_destroy. Not written when the
+///                          call fails.
+/// @retval SKEP_ERR_ARGUMENT   A scene that skep_scene_validate refuses, options out of range, or threads
+///                             that cannot be started.
+/// @retval SKEP_ERR_CANCELLED  The callback returned non-zero.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_reconstruct(
     scene: *const skep_scene,
@@ -128,7 +135,9 @@ pub unsafe extern "C" fn skep_reconstruct(
     })
 }
 
-/// Destroys a result; NULL is ignored. Clouds taken from it stay.
+/// Destroys a result. Clouds taken from it are not affected; borrowed maps are freed.
+///
+/// @param result  The result; NULL is ignored.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_result_destroy(result: *mut skep_result) {
     guard(|| {
@@ -138,9 +147,11 @@ pub unsafe extern "C" fn skep_result_destroy(result: *mut skep_result) {
     });
 }
 
-/// The cloud of a whole run, as an object of its own that is destroyed by itself; the points are not copied.
+/// Gets the cloud of a whole run, as an object of its own. The points are shared, not copied.
 ///
-/// SKEP_ERR_ARGUMENT: the result of a single view has no cloud.
+/// @param result     The result of skep_reconstruct.
+/// @param cloud_out  Receives the cloud; destroy it with skep_cloud_destroy.
+/// @retval SKEP_ERR_ARGUMENT  The result of a single view, from skep_stepper_finish, has no cloud.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_result_get_cloud(
     result: *const skep_result,
@@ -161,8 +172,13 @@ pub unsafe extern "C" fn skep_result_get_cloud(
     })
 }
 
-/// The numbers of the views in a result, ascending: all of the scene's after a whole run. `views` may be NULL to only
-/// ask for how many there are.
+/// Gets the numbers of the views in a result, ascending: all views of the scene after a whole run.
+///
+/// @param result     The result.
+/// @param views      Receives `*count_out` numbers of views; may be NULL to ask for their number.
+/// @param capacity   Elements of room in `views`.
+/// @param count_out  Receives the number of views.
+/// @retval SKEP_ERR_CAPACITY  `capacity` is too small.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_result_get_views(
     result: *const skep_result,
@@ -179,10 +195,14 @@ pub unsafe extern "C" fn skep_result_get_views(
     })
 }
 
-/// Copies one of the sentences about the run that its user should read, such as views without any source view;
-/// `index` counts from 0. See skep_scene_get_name for the buffer.
+/// Copies one of the warnings of a run for its user, such as that a view has no source views.
 ///
-/// SKEP_ERR_ARGUMENT: there is no such warning; asking until then lists them all.
+/// @param result      The result.
+/// @param index       Index of the warning, from 0.
+/// @param buffer      Receives up to `capacity` bytes, the last one NUL; may be NULL to ask for the size.
+/// @param capacity    Bytes of room in `buffer`; a longer text is cut.
+/// @param needed_out  Receives the bytes of the whole text with its NUL; may be NULL.
+/// @retval SKEP_ERR_ARGUMENT  `index` is not below the number of warnings: all have been listed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_result_get_warning(
     result: *const skep_result,
@@ -206,138 +226,15 @@ pub unsafe extern "C" fn skep_result_get_warning(
     })
 }
 
-/// Fills the caller's map with what `value` gives for each pixel of a view that `check` lets pass.
+/// Gets the source views of a view.
 ///
-/// # Safety
-/// `result` is NULL or points to a result; `data` is NULL or points to rows of the view's size, `stride_bytes` apart.
-unsafe fn give_map<T: Plain>(
-    result: *const skep_result,
-    view: u32,
-    data: *mut T,
-    stride_bytes: usize,
-    check: impl FnOnce(&ViewResult) -> Result<(), Failure>,
-    value: impl Fn(&ViewResult, usize) -> T,
-) -> skep_status {
-    guard(|| {
-        // SAFETY: as promised by the caller.
-        let view = unsafe { get(result, "result") }?.view(view)?;
-        check(view)?;
-        // SAFETY: as promised by the caller.
-        let out = unsafe { maps::out(data, view.size(), stride_bytes, "out") }?;
-        out.set(|pixel| value(view, pixel));
-        Ok(())
-    })
-}
-
-/// Refuses what is no SKEP_MAPS_ value.
-fn check_which(which: u32) -> Result<(), Failure> {
-    match which {
-        SKEP_MAPS_RAW | SKEP_MAPS_VALIDATED => Ok(()),
-        _ => Err(Failure::argument("which", which, "SKEP_MAPS_RAW or SKEP_MAPS_VALIDATED")),
-    }
-}
-
-/// Whether a pixel's estimate is handed out.
-fn is_given(view: &ViewResult, pixel: usize, which: u32) -> bool {
-    which == SKEP_MAPS_RAW || view.status[pixel] == PixelStatus::Validated
-}
-
-/// Copies a view's depth map: width floats a row, height rows, `stride_bytes` from row to row (at least 4 * width).
-/// World units, 0 where there is no estimate. `which` is a SKEP_MAPS_ value.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_result_get_depth(
-    result: *const skep_result,
-    view: u32,
-    which: u32,
-    out: *mut f32,
-    stride_bytes: usize,
-) -> skep_status {
-    let depth = |view: &ViewResult, pixel| match is_given(view, pixel, which) {
-        true => view.raw.depth[pixel],
-        false => 0.0,
-    };
-    // SAFETY: as the header demands of the caller.
-    unsafe { give_map(result, view, out, stride_bytes, |_| check_which(which), depth) }
-}
-
-/// Copies a view's normal map: x, y, z of each pixel, so 3 * width floats a row (`stride_bytes` at least 12 * width).
-/// Unit vectors in the view's camera frame that face the camera, zeros where there is no estimate.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_result_get_normal(
-    result: *const skep_result,
-    view: u32,
-    which: u32,
-    out: *mut f32,
-    stride_bytes: usize,
-) -> skep_status {
-    let normal = |view: &ViewResult, pixel| match is_given(view, pixel, which) {
-        true => view.raw.normal[pixel],
-        false => [0.0; 3],
-    };
-    let out = out.cast::<[f32; 3]>();
-    // SAFETY: as the header demands of the caller; rows of triples are rows of floats.
-    unsafe { give_map(result, view, out, stride_bytes, |_| check_which(which), normal) }
-}
-
-/// Copies the matching cost of every pixel's raw estimate: the mean of 1 - NCC over its source views, 0 to 2; lower is
-/// surer. `stride_bytes` is at least 4 * width.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_result_get_cost(
-    result: *const skep_result,
-    view: u32,
-    out: *mut f32,
-    stride_bytes: usize,
-) -> skep_status {
-    // SAFETY: as the header demands of the caller.
-    unsafe { give_map(result, view, out, stride_bytes, |_| Ok(()), |view, pixel| view.cost[pixel]) }
-}
-
-/// Copies what became of every pixel, a SKEP_PIXEL_ value each: the reason where there is no validated depth.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_result_get_status(
-    result: *const skep_result,
-    view: u32,
-    out: *mut u8,
-    stride_bytes: usize,
-) -> skep_status {
-    // SAFETY: as the header demands of the caller.
-    unsafe { give_map(result, view, out, stride_bytes, |_| Ok(()), |view, pixel| view.status[pixel] as u8) }
-}
-
-/// Copies the number of source views of every pixel; `stride_bytes` is at least 2 * width.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_result_get_source_count(
-    result: *const skep_result,
-    view: u32,
-    out: *mut u16,
-    stride_bytes: usize,
-) -> skep_status {
-    let count = |view: &ViewResult, pixel| u16::try_from(view.view_sets.count(pixel)).unwrap_or(u16::MAX);
-    // SAFETY: as the header demands of the caller.
-    unsafe { give_map(result, view, out, stride_bytes, |_| Ok(()), count) }
-}
-
-/// Copies which source views each pixel was matched with, as bits, 32 of them: bit i of pixel (x, y) stands for entry
-/// 32 * word + i of skep_result_get_sources. One uint32_t a pixel; ask for word 0, 1, ... as long as there are
-/// sources. `stride_bytes` is at least 4 * width.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_result_get_source_bits(
-    result: *const skep_result,
-    view: u32,
-    word: u32,
-    out: *mut u32,
-    stride_bytes: usize,
-) -> skep_status {
-    let check = |view: &ViewResult| match view.view_sets.words_per_pixel() {
-        words if (word as usize) < words => Ok(()),
-        words => Err(Failure::argument("word", word, format!("below the number of words, {words}"))),
-    };
-    let bits = |view: &ViewResult, pixel| view.view_sets.words_of(pixel)[word as usize];
-    // SAFETY: as the header demands of the caller.
-    unsafe { give_map(result, view, out, stride_bytes, check, bits) }
-}
-
-/// The source views of a view, as numbers of the scene's views. `sources` may be NULL to only ask for their number.
+/// @param result     The result.
+/// @param view       Number of a view in the result.
+/// @param sources    Receives `*count_out` numbers of views; may be NULL to ask for their number.
+/// @param capacity   Elements of room in `sources`.
+/// @param count_out  Receives the number of source views.
+/// @retval SKEP_ERR_ARGUMENT  No such view in the result.
+/// @retval SKEP_ERR_CAPACITY  `capacity` is too small.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_result_get_sources(
     result: *const skep_result,
@@ -355,7 +252,13 @@ pub unsafe extern "C" fn skep_result_get_sources(
     })
 }
 
-/// Width and height of a view's maps.
+/// Gets the size of the maps of a view.
+///
+/// @param result      The result.
+/// @param view        Number of a view in the result.
+/// @param width_out   Receives the width in pixels.
+/// @param height_out  Receives the height in pixels.
+/// @retval SKEP_ERR_ARGUMENT  No such view in the result.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_result_get_size(
     result: *const skep_result,
@@ -374,7 +277,12 @@ pub unsafe extern "C" fn skep_result_get_size(
     })
 }
 
-/// What a view cost and what became of its pixels.
+/// Gets the work spent on a view and the number of pixels of each status.
+///
+/// @param result          The result.
+/// @param view            Number of a view in the result.
+/// @param statistics_out  Receives the numbers.
+/// @retval SKEP_ERR_ARGUMENT  No such view in the result.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_result_get_statistics(
     result: *const skep_result,
@@ -393,7 +301,15 @@ pub unsafe extern "C" fn skep_result_get_statistics(
     })
 }
 
-/// The cycles of a view in order. `cycles` may be NULL to only ask for their number.
+/// Gets the records of the cycles of a view, in order.
+///
+/// @param result     The result.
+/// @param view       Number of a view in the result.
+/// @param cycles     Receives `*count_out` records; may be NULL to ask for their number.
+/// @param capacity   Elements of room in `cycles`.
+/// @param count_out  Receives the number of records.
+/// @retval SKEP_ERR_ARGUMENT  No such view in the result.
+/// @retval SKEP_ERR_CAPACITY  `capacity` is too small.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_result_get_cycles(
     result: *const skep_result,
@@ -412,7 +328,7 @@ pub unsafe extern "C" fn skep_result_get_cycles(
     })
 }
 
-// The values C sees are the outcomes' own.
+// The values of the header are those of the enum.
 const _: () = {
     assert!(SKEP_PIXEL_VALIDATED == PixelStatus::Validated as u8);
     assert!(SKEP_PIXEL_MASKED == PixelStatus::Masked as u8);

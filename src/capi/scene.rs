@@ -3,25 +3,25 @@
 use super::camera::skep_camera;
 use super::image::skep_image;
 use super::maps;
-use super::options::{options_or_default, skep_options};
-use super::pointers::{self, copy_text, destroy, get, give_list, out, slice, text, wanted_one};
+use super::pointers::{self, destroy, get, out, slice, text, wanted_one};
 use super::status::{Failure, guard, skep_status};
 use crate::geometry::DepthRange;
 use crate::scene::{Scene, SparsePoint, View};
-use crate::{fusion, view_selection};
 use glam::DVec3;
 use std::ffi::c_char;
 use std::sync::RwLock;
 
-/// Calibrated photographs and sparse points. May be used from several threads at once; runs that were started with it
-/// keep what it was when they started. Pictures are copied in and shared from then on: a run does not copy them again.
+/// Views (photographs with cameras) and sparse points.
+///
+/// Images are copied when a view is added, and shared from then on: runs do not copy them again. A run uses
+/// the scene as it is when the run starts; later changes do not affect it.
 pub struct skep_scene {
-    inner: RwLock<Parts>,
+    pub(super) inner: RwLock<Parts>,
 }
 
 #[derive(Default)]
-struct Parts {
-    views: Vec<View>,
+pub(super) struct Parts {
+    pub(super) views: Vec<View>,
     points: Vec<SparsePoint>,
 }
 
@@ -37,8 +37,12 @@ impl skep_scene {
         Ok(Scene::new(parts.views.clone(), parts.points.clone())?)
     }
 
-    /// Does something with one view.
-    fn with_view<R>(&self, view: u32, work: impl FnOnce(&View) -> Result<R, Failure>) -> Result<R, Failure> {
+    /// Calls `work` with one view.
+    pub(super) fn with_view<R>(
+        &self,
+        view: u32,
+        work: impl FnOnce(&View) -> Result<R, Failure>,
+    ) -> Result<R, Failure> {
         let parts = pointers::read(&self.inner)?;
         work(parts.views.get(view as usize).ok_or_else(|| no_view(view, parts.views.len()))?)
     }
@@ -51,12 +55,14 @@ impl skep_scene {
     }
 }
 
-/// The error of a view there is not.
+/// The error for a view that does not exist.
 pub fn no_view(view: u32, views: usize) -> Failure {
-    Failure::argument("view", view, format!("a view below their number, {views}"))
+    Failure::argument("view", view, format!("a number below that of the views, {views}"))
 }
 
-/// Makes an empty scene.
+/// Creates an empty scene.
+///
+/// @param scene_out  Receives the scene; destroy it with skep_scene_destroy.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_scene_create(scene_out: *mut *mut skep_scene) -> skep_status {
     guard(|| {
@@ -66,7 +72,9 @@ pub unsafe extern "C" fn skep_scene_create(scene_out: *mut *mut skep_scene) -> s
     })
 }
 
-/// Destroys a scene; NULL is ignored. Results, steps and clouds made from it stay.
+/// Destroys a scene. Results, steppers and clouds created from it are not affected.
+///
+/// @param scene  The scene; NULL is ignored.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_scene_destroy(scene: *mut skep_scene) {
     guard(|| {
@@ -76,9 +84,16 @@ pub unsafe extern "C" fn skep_scene_destroy(scene: *mut skep_scene) {
     });
 }
 
-/// Adds a photograph, copied, rounded to 8 bits a channel; gray is the luma of colors (ITU-R BT.601). `name_or_null`
-/// (UTF-8, copied) names it in messages and files; NULL names it "view0000.png" by its number. Views are numbered in the
-/// order they are added; `view_out`, which may be NULL, receives the number.
+/// Adds a photograph with its camera. Views are numbered from 0 in the order in which they are added. Colors
+/// are converted to gray as luma (ITU-R BT.601).
+///
+/// @param scene         The scene.
+/// @param name_or_null  Name of the view in messages and files, copied; NULL: "view0000.png" with its number.
+/// @param image         The pixels; copied, rounded to 8 bits a channel.
+/// @param camera        The camera; copied.
+/// @param view_out      Receives the number of the view; may be NULL.
+/// @retval SKEP_ERR_ARGUMENT  A size, stride, format, float pixel or camera that cannot be used, or a name
+///                            that another view has.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_scene_add_view(
     scene: *mut skep_scene,
@@ -115,8 +130,14 @@ pub unsafe extern "C" fn skep_scene_add_view(
     })
 }
 
-/// Says where depths are wanted in a view: one byte for each pixel, `stride_bytes` from row to row, 0 where none is
-/// wanted. Masked pixels still serve as sources for other views. NULL takes the mask away.
+/// Sets the mask of a view. Pixels that are masked out get no estimate, but still serve as source pixels of
+/// other views.
+///
+/// @param scene         The scene.
+/// @param view          Number of the view.
+/// @param mask_or_null  height rows of width bytes, copied: 0 masks a pixel out; NULL removes the mask.
+/// @param stride_bytes  Bytes from a row to the next, at least width; ignored with NULL.
+/// @retval SKEP_ERR_ARGUMENT  No such view, or a stride that is too small.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_scene_set_mask(
     scene: *mut skep_scene,
@@ -142,8 +163,14 @@ pub unsafe extern "C" fn skep_scene_set_mask(
     })
 }
 
-/// Says between which depths surfaces are looked for in a view, in world units, 0 < near < far. (0, 0) goes back to
-/// the range that the sparse points the view saw suggest, which is the default.
+/// Sets the depth range that is searched in a view. By default it is derived from the sparse points that the
+/// view observes.
+///
+/// @param scene  The scene.
+/// @param view   Number of the view.
+/// @param near   Smallest depth in world units, above 0; 0 with `far` 0 restores the default.
+/// @param far    Largest depth in world units, above `near`.
+/// @retval SKEP_ERR_ARGUMENT  No such view, or not 0 < near < far.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_scene_set_depth_range(
     scene: *mut skep_scene,
@@ -166,8 +193,15 @@ pub unsafe extern "C" fn skep_scene_set_depth_range(
     })
 }
 
-/// Says which views a view is matched with, the most important first, each at most once, not itself. They may be added
-/// later. (NULL, 0) goes back to choosing them by their triangulation angle, which is the default.
+/// Sets the source views of a view, which it is matched with. By default they are selected by triangulation
+/// angle. The views may be added later.
+///
+/// @param scene    The scene.
+/// @param view     Number of the view.
+/// @param sources  `count` numbers of other views, the most important first, each at most once; copied; may
+///                 be NULL when `count` is 0.
+/// @param count    Number of source views; 0 restores the default.
+/// @retval SKEP_ERR_ARGUMENT  No such view.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_scene_set_sources(
     scene: *mut skep_scene,
@@ -185,11 +219,17 @@ pub unsafe extern "C" fn skep_scene_set_sources(
     })
 }
 
-/// Adds sparse points with the views that saw them, copied. `positions` holds x, y, z of each point; `view_counts` the
-/// number of views of each, and `views` their numbers, point after point, `view_total` in all.
+/// Adds sparse points with the views that observe them. Depth ranges and source views are derived from them;
+/// without any points each view needs a depth range. The views may be added later.
 ///
-/// The views may be added later. Points give the depth ranges and choose the source views; without any, give each view
-/// a depth range.
+/// @param scene        The scene.
+/// @param positions    3 * count doubles: x, y, z of each point in the world; copied.
+/// @param count        Number of points.
+/// @param view_counts  `count` numbers: how many views observe each point; copied.
+/// @param views        `view_total` numbers of views, point after point; copied.
+/// @param view_total   Sum of `view_counts`.
+/// @retval SKEP_ERR_ARGUMENT  A coordinate that is not finite, or a `view_total` that is not the sum of
+///                            `view_counts`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_scene_add_points(
     scene: *mut skep_scene,
@@ -236,182 +276,15 @@ pub unsafe extern "C" fn skep_scene_add_points(
     })
 }
 
-/// Checks the scene as a run would: at least two views, points and sources that name views there are, a depth range
-/// for every view. A run checks it too.
+/// Checks a scene as a run does when it starts: at least two views, source views and observing views that
+/// exist, a depth range for every view.
+///
+/// @param scene  The scene.
+/// @retval SKEP_ERR_ARGUMENT  The first violation; the text names it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_scene_validate(scene: *const skep_scene) -> skep_status {
     guard(|| {
         // SAFETY: as the header demands of the caller.
         unsafe { get(scene, "scene") }?.checked().map(drop)
-    })
-}
-
-/// The number of views.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_scene_get_view_count(
-    scene: *const skep_scene,
-    count_out: *mut u32,
-) -> skep_status {
-    guard(|| {
-        // SAFETY: as the header demands of the caller.
-        let (scene, out) = unsafe { (get(scene, "scene")?, out(count_out, "count_out")?) };
-        out.set(pointers::read(&scene.inner)?.views.len() as u32);
-        Ok(())
-    })
-}
-
-/// A view's size and camera. Each output may be NULL.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_scene_get_view(
-    scene: *const skep_scene,
-    view: u32,
-    width_out: *mut u32,
-    height_out: *mut u32,
-    camera_out: *mut skep_camera,
-) -> skep_status {
-    guard(|| {
-        // SAFETY: as the header demands of the caller.
-        let scene = unsafe { get(scene, "scene") }?;
-        let camera = scene.with_view(view, |view| Ok(view.camera))?;
-        // SAFETY: as the header demands of the caller.
-        unsafe {
-            let width = wanted_one(width_out, "width_out")?;
-            let height = wanted_one(height_out, "height_out")?;
-            let place = wanted_one(camera_out, "camera_out")?;
-            width.into_iter().for_each(|out| out.set(camera.width));
-            height.into_iter().for_each(|out| out.set(camera.height));
-            place.into_iter().for_each(|out| out.set(skep_camera::of(&camera)));
-        }
-        Ok(())
-    })
-}
-
-/// Copies a view's name as skep_last_error copies its text: at most `capacity` bytes with the NUL. `needed_out`, which
-/// may be NULL, receives the bytes the whole name takes with its NUL.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_scene_get_name(
-    scene: *const skep_scene,
-    view: u32,
-    buffer: *mut c_char,
-    capacity: usize,
-    needed_out: *mut usize,
-) -> skep_status {
-    guard(|| {
-        // SAFETY: as the header demands of the caller.
-        let scene = unsafe { get(scene, "scene") }?;
-        let name = scene.with_view(view, |view| Ok(view.name.clone()))?;
-        // SAFETY: as the header demands of the caller.
-        unsafe { give_text(&name, buffer, capacity, needed_out) }
-    })
-}
-
-/// # Safety
-/// `buffer` is NULL or points to `capacity` writable bytes, `needed` is NULL or points to memory for a size.
-pub unsafe fn give_text(
-    text: &str,
-    buffer: *mut c_char,
-    capacity: usize,
-    needed: *mut usize,
-) -> Result<(), Failure> {
-    // SAFETY: as promised by the caller.
-    unsafe {
-        let place = wanted_one(needed, "needed_out")?;
-        let length = copy_text(text, buffer, capacity);
-        place.into_iter().for_each(|place| place.set(length));
-    }
-    Ok(())
-}
-
-/// The depth range a run would search in a view: its own, or the one its sparse points suggest.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_scene_get_depth_range(
-    scene: *const skep_scene,
-    view: u32,
-    near_out: *mut f64,
-    far_out: *mut f64,
-) -> skep_status {
-    guard(|| {
-        // SAFETY: as the header demands of the caller.
-        let (scene, near, far) =
-            unsafe { (get(scene, "scene")?, out(near_out, "near_out")?, out(far_out, "far_out")?) };
-        let scene = scene.checked()?;
-        if view as usize >= scene.views().len() {
-            return Err(no_view(view, scene.views().len()));
-        }
-        let range = scene.depth_range(view as usize);
-        near.set(range.near);
-        far.set(range.far);
-        Ok(())
-    })
-}
-
-/// The source views a run with these options would match a view with. `sources` may be NULL to only ask for their
-/// number.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_scene_get_sources(
-    scene: *const skep_scene,
-    options_or_null: *const skep_options,
-    view: u32,
-    sources: *mut u32,
-    capacity: usize,
-    count_out: *mut usize,
-) -> skep_status {
-    guard(|| {
-        // SAFETY: as the header demands of the caller.
-        let (scene, options) =
-            unsafe { (get(scene, "scene")?.checked()?, options_or_default(options_or_null)?) };
-        options.check()?;
-        let lists = view_selection::source_lists(&scene, &options).lists;
-        let list = lists.get(view as usize).ok_or_else(|| no_view(view, lists.len()))?;
-        // SAFETY: as the header demands of the caller.
-        unsafe { give_list(list, sources, capacity, count_out, ("sources", "count_out")) }
-    })
-}
-
-/// The views that may see the same surface as a view, which is what fusion asks: those that saw a sparse point together
-/// with it, or all others when it saw none. `views` may be NULL to only ask for their number.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_scene_get_overlap(
-    scene: *const skep_scene,
-    view: u32,
-    views: *mut u32,
-    capacity: usize,
-    count_out: *mut usize,
-) -> skep_status {
-    guard(|| {
-        // SAFETY: as the header demands of the caller.
-        let scene = unsafe { get(scene, "scene") }?.checked()?;
-        let overlaps = fusion::overlaps(scene.views().len(), scene.points());
-        let list = overlaps.get(view as usize).ok_or_else(|| no_view(view, overlaps.len()))?;
-        // SAFETY: as the header demands of the caller.
-        unsafe { give_list(list, views, capacity, count_out, ("views", "count_out")) }
-    })
-}
-
-/// The triangulation angle of two views in degrees: the 75th percentile of the angles at the sparse points both saw
-/// or, where they share fewer than three, at the geometric mean of `reference`'s depth range. -1 when they
-/// see nothing together.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_scene_get_triangulation_angle(
-    scene: *const skep_scene,
-    reference: u32,
-    source: u32,
-    degrees_out: *mut f64,
-) -> skep_status {
-    guard(|| {
-        // SAFETY: as the header demands of the caller.
-        let (scene, out) = unsafe { (get(scene, "scene")?, out(degrees_out, "degrees_out")?) };
-        let scene = scene.checked()?;
-        for view in [reference, source] {
-            if view as usize >= scene.views().len() {
-                return Err(no_view(view, scene.views().len()));
-            }
-        }
-        if reference == source {
-            return Err(Failure::argument("source", source, "another view than the reference"));
-        }
-        let angle = view_selection::triangulation_angle(&scene, reference as usize, source as usize);
-        out.set(angle.unwrap_or(-1.0));
-        Ok(())
     })
 }

@@ -7,27 +7,28 @@ use std::cell::RefCell;
 use std::ffi::{CStr, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// What a call came to: SKEP_OK or one of the negative SKEP_ERR_ codes. skep_last_error tells the rest.
+/// Result of a call: SKEP_OK or one of the negative SKEP_ERR_ codes; skep_last_error returns the text.
 pub type skep_status = i32;
 
-/// Version of this interface, which rises with every incompatible change. The SONAME follows the library's version.
+/// Version of this interface; it rises with every incompatible change. The SONAME follows the library's
+/// version.
 pub const SKEP_ABI_VERSION: u32 = 1;
 
-/// Done.
+/// Success.
 pub const SKEP_OK: i32 = 0;
-/// A pointer that must not be NULL is.
+/// A pointer that must not be NULL is NULL.
 pub const SKEP_ERR_NULL: i32 = -1;
-/// A value cannot be used: out of range, not a number, of the wrong size, unknown, or in the wrong order.
+/// A value cannot be used: out of range, not finite, of the wrong size, unknown, or in the wrong order.
 pub const SKEP_ERR_ARGUMENT: i32 = -2;
-/// The object cannot be used any more: a call that was changing it panicked. Destroy it.
+/// A scene or options object cannot be used any more: a call that was changing it panicked. Destroy it.
 pub const SKEP_ERR_POISONED: i32 = -3;
-/// The progress callback asked to stop.
+/// The progress callback returned non-zero.
 pub const SKEP_ERR_CANCELLED: i32 = -4;
-/// A file cannot be read, understood or written.
+/// A file cannot be read, parsed or written.
 pub const SKEP_ERR_FILE: i32 = -5;
-/// A buffer is smaller than what goes into it.
+/// A buffer is too small for the output.
 pub const SKEP_ERR_CAPACITY: i32 = -6;
-/// An error of the library itself; please report the text.
+/// An error in the library itself; please report the text.
 pub const SKEP_ERR_PANIC: i32 = -7;
 
 /// A failed call.
@@ -57,14 +58,14 @@ impl From<Error> for Failure {
     }
 }
 
-/// Result of the inside of an entry.
+/// Result of the body of an entry.
 pub type Status = Result<(), Failure>;
 
 thread_local! {
     static LAST_ERROR: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
-/// Runs the inside of an entry. A panic ends here: unwinding into C would be undefined behavior.
+/// Runs the body of an entry. A panic is caught here: unwinding into C would be undefined behavior.
 pub fn guard(entry: impl FnOnce() -> Status) -> skep_status {
     let failure = match catch_unwind(AssertUnwindSafe(entry)) {
         Ok(Ok(())) => return SKEP_OK,
@@ -76,26 +77,33 @@ pub fn guard(entry: impl FnOnce() -> Status) -> skep_status {
             Failure::new(SKEP_ERR_PANIC, text)
         }
     };
-    // Threads that are just ending have no place for a text any more.
+    // The thread-local text of a thread that is exiting may be gone already.
     let _ = LAST_ERROR.try_with(|last| *last.borrow_mut() = failure.text);
     failure.status
 }
 
-/// The SKEP_ABI_VERSION the library was built with. Compare it with the one of the header you compiled against.
+/// Version of the interface that the library was built with; compare it with SKEP_ABI_VERSION of the header.
+///
+/// @return The version.
 #[unsafe(no_mangle)]
 pub extern "C" fn skep_abi_version() -> u32 {
     SKEP_ABI_VERSION
 }
 
-/// The library's version, such as "0.1.0"; static.
+/// Version of the library, such as "0.1.0".
+///
+/// @return A static text.
 #[unsafe(no_mangle)]
 pub extern "C" fn skep_version() -> *const c_char {
     const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "\0");
     VERSION.as_ptr().cast()
 }
 
-/// The instruction set that runs are made on unless an option says otherwise: "scalar", "baseline" or "v3" (AVX2); static.
-/// The environment variable SKEP_SIMD forces one of them, lowered to what the machine has. Results do not depend on it.
+/// Instruction set that runs use unless option "simd" says otherwise: "scalar", "baseline" or "v3" (AVX2).
+/// Results do not depend on it. The environment variable SKEP_SIMD selects another one, lowered to what the
+/// machine has.
+///
+/// @return A static text.
 #[unsafe(no_mangle)]
 pub extern "C" fn skep_simd_level_name() -> *const c_char {
     let name: &CStr = match SimdLevel::detect() {
@@ -106,14 +114,17 @@ pub extern "C" fn skep_simd_level_name() -> *const c_char {
     name.as_ptr()
 }
 
-/// A word for a status, such as "argument"; static, never NULL.
+/// Short name of a status, such as "argument".
+///
+/// @param status  Any number.
+/// @return A static text, never NULL; "unknown" for other numbers.
 #[unsafe(no_mangle)]
 pub extern "C" fn skep_status_name(status: skep_status) -> *const c_char {
     let name: &CStr = match status {
         SKEP_OK => c"ok",
         SKEP_ERR_NULL => c"null",
         SKEP_ERR_ARGUMENT => c"argument",
-        SKEP_ERR_POISONED => c"state",
+        SKEP_ERR_POISONED => c"poisoned",
         SKEP_ERR_CANCELLED => c"cancelled",
         SKEP_ERR_FILE => c"file",
         SKEP_ERR_CAPACITY => c"capacity",
@@ -123,11 +134,14 @@ pub extern "C" fn skep_status_name(status: skep_status) -> *const c_char {
     name.as_ptr()
 }
 
-/// Copies the text of the last call of this thread that failed: the argument, its value, and what would have been
-/// right. Empty before the first failure; calls that succeed leave it alone.
+/// Copies the error text of the last failed call of the calling thread: the argument, its value and what was
+/// expected. It is empty before the first failure; calls that succeed do not change it.
 ///
-/// At most `capacity` bytes are written, the last of them NUL; a longer text is cut between characters. (NULL, 0) only
-/// asks for the length. Returns the bytes the whole text takes with its NUL.
+/// A text that is too long is cut between characters, and still ends with NUL.
+///
+/// @param buffer    Receives up to `capacity` bytes, the last one NUL; may be NULL to ask for the size.
+/// @param capacity  Bytes of room in `buffer`.
+/// @return Bytes of the whole text with its NUL.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_last_error(buffer: *mut c_char, capacity: usize) -> usize {
     let copy = |last: &RefCell<String>| {

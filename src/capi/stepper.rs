@@ -1,4 +1,4 @@
-//! A run taken apart, in C.
+//! Stepwise runs in C.
 
 use super::estimate::skep_estimate;
 use super::options::{options_or_default, skep_options};
@@ -11,44 +11,61 @@ use crate::parallel::JoinedPool;
 use crate::pipeline::{AnyEstimate, Candidates, Checked, EstimateRef, Stepper, ViewEstimate};
 use std::ffi::c_void;
 
-/// A run taken apart, for hosts that schedule views themselves, on one machine or on many, or that bring maps of their
-/// own. Holds what all stepper share (images of all scales, source views, threads) and never changes: stepper of
-/// different views may be taken at the same time from several threads. The scene may be destroyed.
+/// The stages of a run on single views, for hosts that schedule views themselves. Immutable.
 ///
-/// A run is this, for step 0 and then for what skep_stepper_next says, until that is SKEP_CYCLE_NONE:
-///   - when the step is on a finer scale than the estimates, skep_stepper_upsample each of them;
-///   - skep_stepper_propagate, then skep_stepper_search each view, all from the estimates the step before left;
-///   - skep_stepper_check each view against what all have just found: that is what the next step starts from.
+/// A stepper holds what all stages share: image pyramids, source views and threads. Different views may be
+/// processed at the same time from several threads, or on several machines: estimates are saved to bytes and
+/// loaded by a stepper of the same scene and options.
 ///
-/// After the last, skep_stepper_finish each view, and skep_fuse the validated maps. Done so for all views, that gives the
-/// same bits as skep_reconstruct.
+/// A run is, for cycle 0 and then for each cycle that skep_stepper_next returns, until SKEP_CYCLE_NONE:
+///   - for each view, if the cycle is on a finer scale than its estimate: skep_stepper_upsample
+///   - for each view: skep_stepper_propagate, then skep_stepper_search, from the checked estimates of the
+///     previous cycle
+///   - for each view: skep_stepper_check, from the searched estimates of the same cycle
 ///
-/// States are passed as an array with one pointer for each view of the scene. Looked at are only the view itself, its
-/// sources, and the views it is a source of; NULL says that nothing is known of a view. (NULL, 0) knows of none.
+/// and then, for each view, skep_stepper_finish from the checked estimates of the last cycle, and skep_fuse
+/// for the validated maps of all views. That gives the same bits as skep_reconstruct. What each call
+/// performs, and which estimates of other views it reads:
+///
+///   call       stages                                  estimates of other views
+///   upsample   upsampling                              none
+///   propagate  transfer of planes                      checked planes, previous cycle, of the views whose
+///                                                      source lists contain the view
+///   search     search,                                 validated surfaces, previous cycle, of the view's
+///              filling of textureless regions          sources
+///   check      consistency check,                      searched planes, same cycle, of the view's sources
+///              correction of foreground fattening,
+///              plane smoothing,
+///              publication of the validated surface
+///   finish     averaging across views, gap filling,    validated surfaces and checked planes, last cycle,
+///              check of filled pixels, classification  of the view's sources
+///
+/// Arrays of estimates hold one pointer for each view of the scene. Those of the view itself and of the views
+/// named above are read; entries of other views may be NULL. A view without an estimate contributes nothing.
 pub struct skep_stepper {
     stepper: Stepper,
     pool: JoinedPool,
 }
 
-/// Planes that other views offer to the pixels of a view. Never changes.
+/// Planes of other views, transferred to the pixels of a view. Immutable.
 pub struct skep_candidates {
     candidates: Candidates,
 }
 
-/// No step: the run is done.
+/// No cycle: the run is complete.
 pub const SKEP_CYCLE_NONE: u32 = 4294967295;
 
-/// One cycle on one scale.
+/// Scale and search parameters of a cycle.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct skep_cycle {
-    /// Size of the images: 1 is full, 2 half, 4 a quarter.
+    /// Scale of the images: 1 is full size, 2 half, 4 a quarter.
     pub downscale: u32,
-    /// The cycle on that scale, counted from 0.
+    /// Number of the cycle on that scale, from 0.
     pub cycle_on_scale: u32,
-    /// Food sources of each pixel's colony.
+    /// Food sources (plane hypotheses) of the colony of each pixel.
     pub food_sources: u32,
-    /// Rounds of bees.
+    /// Iterations: turns of the employed, onlooker and scout bees.
     pub iterations: u32,
 }
 
@@ -96,12 +113,16 @@ impl skep_stepper {
 /// Refuses an estimate that is not checked; `name` is how the error calls it.
 fn require_checked<'a>(estimate: &'a AnyEstimate, name: &str) -> Result<&'a ViewEstimate<Checked>, Failure> {
     let expected = "one that is checked";
-    estimate.checked().ok_or_else(|| Failure::argument(name, "searched and not checked", expected))
+    estimate.checked().ok_or_else(|| Failure::argument(name, "searched and not yet checked", expected))
 }
 
-/// Prepares the stepper of a run.
+/// Creates a stepper: builds the image pyramids, selects source views and starts threads.
 ///
-/// SKEP_ERR_ARGUMENT: the scene is not in order (see skep_scene_validate) or an option is out of range.
+/// @param scene            The scene, as it is when the call starts; it may be destroyed afterwards.
+/// @param options_or_null  The options, copied; NULL: the default preset.
+/// @param stepper_out      Receives the stepper; destroy it with skep_stepper_destroy.
+/// @retval SKEP_ERR_ARGUMENT  A scene that skep_scene_validate refuses, options out of range, or threads that
+///                            cannot be started.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_stepper_create(
     scene: *const skep_scene,
@@ -122,7 +143,9 @@ pub unsafe extern "C" fn skep_stepper_create(
     })
 }
 
-/// Destroys stepper and ends their threads; NULL is ignored. States and results stay.
+/// Destroys a stepper and ends its threads. Estimates and results made with it are not affected.
+///
+/// @param stepper  The stepper; NULL is ignored.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_stepper_destroy(stepper: *mut skep_stepper) {
     guard(|| {
@@ -132,7 +155,11 @@ pub unsafe extern "C" fn skep_stepper_destroy(stepper: *mut skep_stepper) {
     });
 }
 
-/// The number of stepper, and of views. Either output may be NULL.
+/// Gets the number of cycles of the schedule, and of views.
+///
+/// @param stepper          The stepper.
+/// @param cycle_count_out  Receives the number of cycles on all scales; may be NULL.
+/// @param view_count_out   Receives the number of views; may be NULL.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_stepper_get_count(
     stepper: *const skep_stepper,
@@ -152,7 +179,12 @@ pub unsafe extern "C" fn skep_stepper_get_count(
     })
 }
 
-/// What a step does.
+/// Gets the scale and the search parameters of a cycle.
+///
+/// @param stepper    The stepper.
+/// @param cycle      Number of the cycle, from 0, on all scales.
+/// @param cycle_out  Receives the parameters.
+/// @retval SKEP_ERR_ARGUMENT  No such cycle.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_stepper_get_cycle(
     stepper: *const skep_stepper,
@@ -179,7 +211,14 @@ pub unsafe extern "C" fn skep_stepper_get_cycle(
     })
 }
 
-/// Width and height of a view's maps at a step.
+/// Gets the size of the maps of a view in a cycle.
+///
+/// @param stepper     The stepper.
+/// @param cycle       Number of the cycle.
+/// @param view        Number of the view.
+/// @param width_out   Receives the width in pixels.
+/// @param height_out  Receives the height in pixels.
+/// @retval SKEP_ERR_ARGUMENT  No such cycle or view.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_stepper_get_size(
     stepper: *const skep_stepper,
@@ -200,7 +239,15 @@ pub unsafe extern "C" fn skep_stepper_get_size(
     })
 }
 
-/// The source views of a view: those whose estimates its stepper look at. `sources` may be NULL to only ask for their number.
+/// Gets the source views of a view.
+///
+/// @param stepper    The stepper.
+/// @param view       Number of the view.
+/// @param sources    Receives `*count_out` numbers of views; may be NULL to ask for their number.
+/// @param capacity   Elements of room in `sources`.
+/// @param count_out  Receives the number of source views.
+/// @retval SKEP_ERR_ARGUMENT  No such view.
+/// @retval SKEP_ERR_CAPACITY  `capacity` is too small.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_stepper_get_sources(
     stepper: *const skep_stepper,
@@ -222,8 +269,22 @@ pub unsafe extern "C" fn skep_stepper_get_sources(
     })
 }
 
-/// The planes that other views offer to a view: their consistent solutions where it has no validated one of its own.
-/// From checked estimates.
+/// Transfers planes of other views to a view: for each pixel without a validated plane, the consistent plane
+/// of lowest cost that projects onto it. There are none in the first cycle of a scale, without an estimate of
+/// the view itself, and with option "search.view_propagation" off.
+///
+/// Reads the checked planes of the previous cycle of the views whose source lists contain the view, and of
+/// the view itself. Changes nothing.
+///
+/// @param stepper         The stepper.
+/// @param cycle           Number of the cycle that the candidates are for.
+/// @param view            Number of the view.
+/// @param estimates       `estimate_count` pointers by view: checked estimates on the scale of the cycle,
+///                        NULL for none; may be NULL when `estimate_count` is 0.
+/// @param estimate_count  The number of views, or 0.
+/// @param candidates_out  Receives the candidates; destroy them with skep_candidates_destroy.
+/// @retval SKEP_ERR_ARGUMENT  No such cycle or view; estimates of another view, scale or scene, or that are
+///                            not checked.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_stepper_propagate(
     stepper: *const skep_stepper,
@@ -250,7 +311,9 @@ pub unsafe extern "C" fn skep_stepper_propagate(
     })
 }
 
-/// Destroys candidates; NULL is ignored.
+/// Destroys candidates.
+///
+/// @param candidates  The candidates; NULL is ignored.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_candidates_destroy(candidates: *mut skep_candidates) {
     guard(|| {
@@ -260,9 +323,27 @@ pub unsafe extern "C" fn skep_candidates_destroy(candidates: *mut skep_candidate
     });
 }
 
-/// Searches a view for one cycle: from its own estimate, helped by what is validated in its sources and by what is offered.
-/// Without a estimate of its own it starts at random. From checked estimates on the step's scale; gives one that is still to
-/// be checked. When it is cancelled or fails, `estimate_out` is not written.
+/// Searches the planes of a view for one cycle, then fills its textureless regions from the planes around
+/// them. The new estimate is to be checked before it is used for anything else.
+///
+/// Reads the planes of the view itself, random ones where it has no estimate, and the validated surfaces of
+/// its sources, all of the previous cycle. Changes depth, normal, cost and view set of the pixels, in the new
+/// estimate.
+///
+/// @param stepper             The stepper.
+/// @param cycle               Number of the cycle.
+/// @param view                Number of the view.
+/// @param estimates           `estimate_count` pointers by view: checked estimates on the scale of the cycle,
+///                            NULL for none; may be NULL when `estimate_count` is 0.
+/// @param estimate_count      The number of views, or 0.
+/// @param candidates_or_null  Candidates of skep_stepper_propagate for this cycle and view; NULL: none.
+/// @param progress_or_null    Receives the progress and may cancel; NULL: none.
+/// @param user                Passed to the callback; may be NULL.
+/// @param estimate_out        Receives the searched estimate; destroy it with skep_estimate_destroy. Not
+///                            written when the call fails.
+/// @retval SKEP_ERR_ARGUMENT   No such cycle or view; estimates of another view, scale or scene, or that are
+///                             not checked; candidates of another cycle or view.
+/// @retval SKEP_ERR_CANCELLED  The callback returned non-zero.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_stepper_search(
     stepper: *const skep_stepper,
@@ -300,8 +381,29 @@ pub unsafe extern "C" fn skep_stepper_search(
     })
 }
 
-/// Checks a view's solutions against what its sources have just found, and gives its estimate with the verdicts in it. From
-/// estimates that skep_stepper_search gave; a source whose estimate is NULL cannot speak.
+/// Checks the planes of a view, and prepares them for the next cycle. Four stages, in this order:
+///
+///   1. consistency check: compares the planes with those of the source views; writes the consistent and
+///      validated flags
+///   2. correction of foreground fattening, if the scale may end with this cycle (option
+///      "refine.fattening_passes"): gives pixels beside a depth edge the plane of the surface that their gray
+///      values belong to, or none; changes depths, normals and flags
+///   3. plane smoothing (option "refine.smoothing_passes"): changes depths and normals
+///   4. publication of the validated surface, which the searches of the next cycle and the averaging of
+///      skep_stepper_finish read
+///
+/// So the call changes depths, normals and flags, in the new estimate. It reads the searched planes of the
+/// same cycle of the view's sources; a source without an estimate takes no part in the check.
+///
+/// @param stepper         The stepper.
+/// @param cycle           Number of the cycle.
+/// @param view            Number of the view.
+/// @param estimates       `estimate_count` pointers by view: searched estimates of this cycle, NULL for none,
+///                        except that of the view itself.
+/// @param estimate_count  The number of views.
+/// @param estimate_out    Receives the checked estimate; destroy it with skep_estimate_destroy.
+/// @retval SKEP_ERR_ARGUMENT  No such cycle or view; estimates of another view, scale or scene; none of the
+///                            view itself, or one that is checked already.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_stepper_check(
     stepper: *const skep_stepper,
@@ -329,7 +431,7 @@ pub unsafe extern "C" fn skep_stepper_check(
         let expected = "one that is searched and not checked";
         let own = own.searched().ok_or_else(|| Failure::argument(&name, "checked", expected))?;
         if (own.view(), own.cycle()) != (view as usize, cycle as usize) {
-            let value = format!("that of view {} in cycle {}", own.view(), own.cycle());
+            let value = format!("the estimate of view {} in cycle {}", own.view(), own.cycle());
             return Err(Failure::argument(&name, value, format!("that of view {view} in cycle {cycle}")));
         }
         let sources: Vec<Option<EstimateRef>> =
@@ -340,7 +442,19 @@ pub unsafe extern "C" fn skep_stepper_check(
     })
 }
 
-/// A checked estimate on the next finer scale, that of `step`: each pixel gets the plane of its coarse pixel.
+/// Upsamples a checked estimate to the next finer scale: each pixel gets the plane of its coarse pixel, with
+/// its flags.
+///
+/// Reads the estimate only.
+///
+/// @param stepper       The stepper.
+/// @param cycle         Number of a cycle on the finer scale.
+/// @param view          Number of the view.
+/// @param estimate      The checked estimate of the view, on the scale before.
+/// @param estimate_out  Receives the checked estimate on the finer scale; destroy it with
+///                      skep_estimate_destroy.
+/// @retval SKEP_ERR_ARGUMENT  No such cycle or view; an estimate of another view, scale or scene, or that is
+///                            not checked.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_stepper_upsample(
     stepper: *const skep_stepper,
@@ -357,7 +471,7 @@ pub unsafe extern "C" fn skep_stepper_upsample(
         let estimate = require_checked(estimate.inner(), "estimate")?;
         if estimate.view() != view as usize {
             let (value, expected) =
-                (format!("that of view {}", estimate.view()), format!("that of view {view}"));
+                (format!("the estimate of view {}", estimate.view()), format!("that of view {view}"));
             return Err(Failure::argument("estimate", value, expected));
         }
         let upsampled = stepper.install(|| stepper.stepper.upsample(cycle as usize, estimate))?;
@@ -366,8 +480,19 @@ pub unsafe extern "C" fn skep_stepper_upsample(
     })
 }
 
-/// The step to take after `step` was taken for all views; SKEP_CYCLE_NONE after the last. A scale ends early when too
-/// few pixels of the given estimates, which are checked ones of `step`, changed (option "stop_share").
+/// Gets the cycle that follows a cycle. A scale ends early when the fraction of changed pixels in all given
+/// estimates is below option "schedule.min_changed_fraction".
+///
+/// Reads the numbers of changed pixels only.
+///
+/// @param stepper         The stepper.
+/// @param cycle           Number of the cycle that was searched and checked.
+/// @param estimates       `estimate_count` pointers by view: checked estimates of this cycle, NULL for none;
+///                        may be NULL when `estimate_count` is 0.
+/// @param estimate_count  The number of views, or 0.
+/// @param next_out        Receives the number of the next cycle; SKEP_CYCLE_NONE after the last.
+/// @retval SKEP_ERR_ARGUMENT  No such cycle; estimates of another view, scale or scene, or that are not
+///                            checked.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_stepper_next(
     stepper: *const skep_stepper,
@@ -393,9 +518,29 @@ pub unsafe extern "C" fn skep_stepper_next(
     })
 }
 
-/// Averages planes with those of the source views, closes small gaps, and settles source views, cost and status of
-/// every pixel of a view after the last step, from checked estimates. The result holds this view alone, under its own
-/// number.
+/// Finishes a view after the last cycle. Four stages, in this order:
+///
+///   1. averaging of the validated planes with those of the source views (option
+///      "refine.cross_view_averaging"); reads the published surfaces of the last cycle of the view's sources
+///   2. gap filling from the surrounding planes (option "refine.fill_gaps")
+///   3. check of the filled pixels against the planes of the source views as they were before averaging:
+///      reads the checked planes of the last cycle of the view's sources; pixels that fail keep what they had
+///   4. classification: determines view set, cost and status of every pixel
+///
+/// The estimates are not changed.
+///
+/// @param stepper           The stepper.
+/// @param view              Number of the view.
+/// @param estimates         `estimate_count` pointers by view: checked estimates of the last cycle, NULL for
+///                          none, except that of the view itself.
+/// @param estimate_count    The number of views.
+/// @param progress_or_null  Receives the progress and may cancel; NULL: none.
+/// @param user              Passed to the callback; may be NULL.
+/// @param result_out        Receives a result that holds this view alone, under its number; destroy it with
+///                          skep_result_destroy. Not written when the call fails.
+/// @retval SKEP_ERR_ARGUMENT   No such view; estimates of another view, scale or scene, or that are not
+///                             checked; none of the view itself.
+/// @retval SKEP_ERR_CANCELLED  The callback returned non-zero.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_stepper_finish(
     stepper: *const skep_stepper,

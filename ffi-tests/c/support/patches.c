@@ -8,7 +8,7 @@ skep_ncc_window *make_window(void) {
     return window;
 }
 
-skep_packed_image *make_samples(const scene *made, uint32_t view) {
+skep_packed_image *make_packed_image(const scene *made, uint32_t view) {
     const skep_image image = scene_image(made, view);
     skep_packed_image *samples = NULL;
     REQUIRE(skep_packed_image_create(&image, &samples));

@@ -6,7 +6,7 @@
 
 /* The window most tests take. */
 skep_ncc_window *make_window(void);
-skep_packed_image *make_samples(const scene *made, uint32_t view);
+skep_packed_image *make_packed_image(const scene *made, uint32_t view);
 
 /*
  * Planes at the pixels of a view that lie on a surface, up to `most`: two each, the true one and

@@ -14,17 +14,13 @@ static vec3 add(vec3 a, vec3 b, double scale) {
     return (vec3){a.x + b.x * scale, a.y + b.y * scale, a.z + b.z * scale};
 }
 
-static double dot(vec3 a, vec3 b) {
-    return a.x * b.x + a.y * b.y + a.z * b.z;
-}
+static double dot(vec3 a, vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 static vec3 cross(vec3 a, vec3 b) {
     return (vec3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-static vec3 unit(vec3 a) {
-    return add((vec3){0, 0, 0}, a, 1 / sqrt(dot(a, a)));
-}
+static vec3 unit(vec3 a) { return add((vec3){0, 0, 0}, a, 1 / sqrt(dot(a, a))); }
 
 /* A piece of a plane with two axes on it, as wide as `half` says. */
 typedef struct panel {
@@ -41,9 +37,7 @@ static panel make_panel(vec3 center, vec3 normal, double half_u, double half_v) 
 const double SCENE_NEAR = 2.0;
 const double SCENE_FAR = 9.0;
 
-static panel wall(void) {
-    return make_panel((vec3){0, 0, 5}, (vec3){0.35, 0.1, -1}, 100, 100);
-}
+static panel wall(void) { return make_panel((vec3){0, 0, 5}, (vec3){0.35, 0.1, -1}, 100, 100); }
 
 static panel board(void) {
     return make_panel((vec3){0.25, -0.1, 3.7}, (vec3){-0.1, 0.15, -1}, 0.65, 0.5);
@@ -57,7 +51,7 @@ static double cell(int32_t x, int32_t y, uint32_t seed) {
     return (hash ^ (hash >> 15)) / 4294967296.0;
 }
 
-/* Those numbers with smooth stepper between them. */
+/* Those numbers, smoothly interpolated. */
 static double noise(double x, double y, uint32_t seed) {
     const double left = floor(x), top = floor(y);
     double u = x - left, v = y - top;
@@ -89,8 +83,8 @@ static vec3 ray(const skep_camera *camera, const pose *from, double x, double y)
     return add(sideways, from->down, (y - camera->cy) / camera->fy);
 }
 
-/* What a ray of length 1 in depth meets first: 1 the wall, 2 the board. */
-static int look(vec3 from, vec3 direction, double *depth, panel *met, double color[3]) {
+/* The surface that a ray of length 1 in depth meets first: 1 the wall, 2 the board. */
+static int cast(vec3 from, vec3 direction, double *depth, panel *met, double color[3]) {
     double u, v;
     int which = 2;
     *met = board();
@@ -114,7 +108,7 @@ static void photograph_pixel(const scene *made, photograph *taken, const pose *f
     const size_t pixel = (size_t)y * made->width + x;
     panel met;
     double depth, color[3], sum[3] = {0, 0, 0};
-    const int center = look(from->center, ray(&taken->camera, from, x, y), &depth, &met, color);
+    const int center = cast(from->center, ray(&taken->camera, from, x, y), &depth, &met, color);
     taken->depth[pixel] = (float)depth;
     taken->normal[3 * pixel] = (float)dot(met.normal, from->right);
     taken->normal[3 * pixel + 1] = (float)dot(met.normal, from->down);
@@ -125,7 +119,7 @@ static void photograph_pixel(const scene *made, photograph *taken, const pose *f
     for (int sample = 0; sample < SIDE * SIDE; ++sample) {
         const double dx = (sample % SIDE - SIDE / 2) / (double)SIDE;
         const double dy = (sample / SIDE - SIDE / 2) / (double)SIDE;
-        look(from->center, ray(&taken->camera, from, x + dx, y + dy), &depth, &met, color);
+        cast(from->center, ray(&taken->camera, from, x + dx, y + dy), &depth, &met, color);
         for (int channel = 0; channel < 3; ++channel) {
             sum[channel] += color[channel] / (SIDE * SIDE);
         }
@@ -134,7 +128,7 @@ static void photograph_pixel(const scene *made, photograph *taken, const pose *f
     const int reach = 4;
     for (int corner = 0; corner < 9; ++corner) {
         const double dx = (corner % 3 - 1) * reach, dy = (corner / 3 - 1) * reach;
-        if (look(from->center, ray(&taken->camera, from, x + dx, y + dy), &depth, &met, color) !=
+        if (cast(from->center, ray(&taken->camera, from, x + dx, y + dy), &depth, &met, color) !=
             center) {
             taken->surface[pixel] = 0;
         }
@@ -185,7 +179,7 @@ static vec3 columns_times(const skep_camera *camera, vec3 a) {
                   r[2] * a.x + r[5] * a.y + r[8] * a.z};
 }
 
-/* Whether a view shows this point of the world: there is nothing before it. */
+/* Whether a point of the world is visible in a view of the world: there is nothing before it. */
 static int sees(const scene *made, uint32_t view, vec3 point) {
     const skep_camera *camera = &made->photographs[view].camera;
     const double *t = camera->translation;
@@ -238,9 +232,7 @@ void scene_make_sized(scene *made, uint32_t views, uint32_t width, uint32_t heig
     make_points(made);
 }
 
-int scene_is_small(void) {
-    return getenv("SKEP_TEST_SMALL") != NULL;
-}
+int scene_is_small(void) { return getenv("SKEP_TEST_SMALL") != NULL; }
 
 void scene_make(scene *made) {
     if (scene_is_small()) {
@@ -263,9 +255,7 @@ void scene_free(scene *made) {
     free(made->point_views);
 }
 
-size_t scene_pixels(const scene *made) {
-    return (size_t)made->width * made->height;
-}
+size_t scene_pixels(const scene *made) { return (size_t)made->width * made->height; }
 
 skep_image scene_image(const scene *made, uint32_t view) {
     return (skep_image){.data = made->photographs[view].rgb,
@@ -289,17 +279,16 @@ skep_scene *scene_hand_in(const scene *made) {
 }
 
 skep_options *quick_options(void) {
-    const skep_scale scales[] = {
-        {.halvings = 1, .foods = 4, .first_iterations = 5, .cycles = 1, .cycle_iterations = 1},
-        {.halvings = 0, .foods = 3, .first_iterations = 1, .cycles = 1, .cycle_iterations = 1}};
     skep_options *options = NULL;
     REQUIRE(skep_options_create(NULL, &options));
-    REQUIRE(skep_options_set_scales(options, scales, 2));
+    REQUIRE(skep_options_set_text(options, "schedule.scales",
+                                  "downscale=2 food_sources=4 iterations=5+1x1; "
+                                  "downscale=1 food_sources=3 iterations=1+1x1"));
     REQUIRE(skep_options_set(options, "threads", 2));
     REQUIRE(skep_options_set(options, "fusion.min_views", 2));
     if (scene_is_small()) {
         /* All of it is edge. */
-        REQUIRE(skep_options_set(options, "edge_passes", 0));
+        REQUIRE(skep_options_set(options, "fattening_passes", 0));
     }
     return options;
 }

@@ -8,17 +8,18 @@ Calibrated photographs go in; depth, normal and source-view maps and a fused poi
     result = skep.reconstruct(scene, progress=lambda progress: print(f"{progress.done:.0%}"))
     depth, points = result[0].depth, result.cloud.positions
 
-There are three levels, which can be mixed: whole runs (`reconstruct`), a run taken apart (`Stepper`), and kernels
-(`plane_homographies`, `patch_ncc`).
+There are three levels, which can be mixed: whole runs (`reconstruct`), the stages of a run on single views
+(`Stepper`), and kernels (`plane_homographies`, `patch_ncc`).
 
-What holds everywhere: x_cam = R x_world + t with x right, y down, z forward; depth is z; the center of the top-left
-pixel is (0, 0). Arrays that go in are copied, or only read during the call. The same input, options and version give
-the same bits. Calls release the interpreter's lock, and any function may be called from any thread.
+What holds everywhere: x_cam = R x_world + t with x right, y down, z forward; depth is z; the center of the
+top-left pixel is (0, 0). Arrays that go in are copied, or only read during the call. The same input, options
+and version give the same bits. Calls release the interpreter's lock, and any function may be called from any
+thread.
 """
 
 from ._camera import Camera
 from ._cloud import Cloud, FusionView, fuse
-from ._errors import ArgumentError, Cancelled, CapacityError, Error, FileError, InternalError, StateError
+from ._errors import ArgumentError, Cancelled, CapacityError, Error, FileError, InternalError, PoisonedError
 from ._files import (
     read_consistency_graph,
     read_depth_map,
@@ -27,20 +28,22 @@ from ._files import (
     write_depth_map,
     write_normal_map,
 )
-from ._kernels import PackedImage, Window, patch_ncc, plane_homographies, plane_through
+from ._kernels import NccWindow, PackedImage, patch_ncc, plane_homographies, plane_through
 from ._native import ffi as _ffi, lib as _lib
-from ._options import Options, Scale
+from ._options import Options
 from ._pycolmap import from_pycolmap
-from ._result import Cycle, PixelStatus, Result, ResultView, Statistics, reconstruct
+from ._result import CycleRecord, PixelStatus, Result, ResultView, Statistics, reconstruct
 from ._run import Phase, Progress
 from ._scene import Scene
-from ._stepper import Candidates, Estimate, StateInfo, StateMaps, Cycle, Stepper
+from ._stepper import Candidates, Cycle, Estimate, EstimateInfo, EstimateMaps, Stepper
 
 __version__: str = _ffi.string(_lib.skep_version()).decode()
 
 
-def backend_name() -> str:
-    """The instruction set of runs: "scalar", "base" or "v3" (AVX2). Results do not depend on it."""
+def simd_level_name() -> str:
+    """The instruction set that runs use unless option "simd" says otherwise: "scalar", "baseline" or "v3"
+    (AVX2).
+    """
     name: str = _ffi.string(_lib.skep_simd_level_name()).decode()
     return name
 
@@ -49,32 +52,30 @@ __all__ = [
     "ArgumentError",
     "Camera",
     "Cancelled",
+    "Candidates",
     "CapacityError",
     "Cloud",
     "Cycle",
+    "CycleRecord",
     "Error",
+    "Estimate",
+    "EstimateInfo",
+    "EstimateMaps",
     "FileError",
     "FusionView",
     "InternalError",
-    "Candidates",
+    "NccWindow",
     "Options",
-    "PixelStatus",
+    "PackedImage",
     "Phase",
+    "PixelStatus",
+    "PoisonedError",
     "Progress",
     "Result",
     "ResultView",
-    "PackedImage",
-    "Scale",
     "Scene",
-    "Estimate",
-    "StateError",
-    "StateInfo",
-    "StateMaps",
     "Statistics",
-    "Cycle",
     "Stepper",
-    "Window",
-    "backend_name",
     "from_pycolmap",
     "fuse",
     "patch_ncc",
@@ -84,6 +85,7 @@ __all__ = [
     "read_depth_map",
     "read_normal_map",
     "reconstruct",
+    "simd_level_name",
     "write_consistency_graph",
     "write_depth_map",
     "write_normal_map",

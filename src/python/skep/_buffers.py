@@ -105,7 +105,7 @@ def take_indices(call: Callable[[Any, int, Any], int]) -> tuple[int, ...]:
 
 
 class _Borrowed:
-    """Memory of a library object, which numpy keeps alive through this as long as an array looks at it."""
+    """Memory of a library object, which numpy keeps alive through this as long as an array uses it."""
 
     def __init__(self, owner: Any, address: Any, dtype: Any, shape: tuple[int, ...]) -> None:
         self.owner = owner

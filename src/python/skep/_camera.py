@@ -15,8 +15,8 @@ from ._native import ffi
 class Camera:
     """A pinhole camera without distortion: x_cam = R x_world + t, with x right, y down, z forward.
 
-    `K` is [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], for pixels whose top-left center is (0, 0), as in OpenCV; COLMAP's
-    principal points are half a pixel larger.
+    `K` is [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], for pixels whose top-left center is (0, 0), as in OpenCV;
+    COLMAP's principal points are half a pixel larger.
     """
 
     __slots__ = ("K", "R", "t")
@@ -29,7 +29,11 @@ class Camera:
         self.K = doubles(K, (3, 3), "K").copy()
         self.R = doubles(np.eye(3) if R is None else R, (3, 3), "R").copy()
         self.t = doubles(np.zeros(3) if t is None else np.ravel(np.asarray(t)), (3,), "t").copy()
-        if self.K[0, 1] != 0 or not np.array_equal(self.K[1:, 0], [0, 0]) or not np.array_equal(self.K[2], [0, 0, 1]):
+        if (
+            self.K[0, 1] != 0
+            or not np.array_equal(self.K[1:, 0], [0, 0])
+            or not np.array_equal(self.K[2], [0, 0, 1])
+        ):
             raise ArgumentError(f"K is {self.K.tolist()}: must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]")
         for matrix in (self.K, self.R, self.t):
             matrix.flags.writeable = False
@@ -47,7 +51,9 @@ class Camera:
         """For the library, which checks the numbers."""
         (fx, _, cx), (_, fy, cy), _ = self.K.tolist()
         camera = {"fx": fx, "fy": fy, "cx": cx, "cy": cy}
-        return ffi.new("skep_camera *", camera | {"rotation": self.R.ravel().tolist(), "translation": self.t.tolist()})
+        return ffi.new(
+            "skep_camera *", camera | {"rotation": self.R.ravel().tolist(), "translation": self.t.tolist()}
+        )
 
     @staticmethod
     def from_c(camera: Any) -> Camera:

@@ -72,7 +72,9 @@ class Cloud:
 
     @property
     def views(self) -> NDArray[np.uint32]:
-        """The views of each point, the one it started in first, point after point: `view_counts` of them each."""
+        """The views of each point, the one it started in first, point after point: `view_counts` of them
+        each.
+        """
         return self._lists[1]
 
     def write_ply(self, file: str | os.PathLike[str]) -> None:

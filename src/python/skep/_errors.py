@@ -1,4 +1,6 @@
-"""Failures as exceptions. Their texts are the library's: the argument, its value, and what would have been right."""
+"""Failures as exceptions. Their texts are the library's: the argument, its value, and what would have been
+right.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +8,18 @@ from ._native import ffi, lib
 
 
 class Error(Exception):
-    """What every call of the library raises; `status` is the C ABI's number for it."""
+    """Base of all errors that calls of the library raise; `status` is the C ABI's code."""
 
     status: int = 0
 
 
 class ArgumentError(Error, ValueError):
-    """A value cannot be used: out of range, not a number, of the wrong size, unknown, or in the wrong order."""
+    """A value cannot be used: out of range, not finite, of the wrong size, unknown, or in the wrong order."""
 
     status = lib.SKEP_ERR_ARGUMENT
 
 
-class StateError(Error, RuntimeError):
+class PoisonedError(Error, RuntimeError):
     """The object cannot be used any more: a call that was changing it failed inside the library."""
 
     status = lib.SKEP_ERR_POISONED
@@ -47,12 +49,12 @@ class InternalError(Error, RuntimeError):
     status = lib.SKEP_ERR_PANIC
 
 
-_KINDS = (ArgumentError, StateError, Cancelled, FileError, CapacityError, InternalError)
+_KINDS = (ArgumentError, PoisonedError, Cancelled, FileError, CapacityError, InternalError)
 _BY_STATUS: dict[int, type[Error]] = {kind.status: kind for kind in _KINDS}
 
 
 def check(status: int) -> None:
-    """Raises what a call of this thread came to, unless that is success."""
+    """Raises the error of a call that this thread made, unless it succeeded."""
     if status == lib.SKEP_OK:
         return
     size = lib.skep_last_error(ffi.NULL, 0)

@@ -53,7 +53,9 @@ def read_normal_map(file: Path) -> NDArray[np.float32]:
 
 
 def write_consistency_graph(file: Path, counts: NDArray[Any], views: NDArray[Any]) -> None:
-    """Writes a consistency graph: how many views each pixel has, (height, width), and which, pixel after pixel."""
+    """Writes a consistency graph: how many views each pixel has, (height, width), and which, pixel after
+    pixel.
+    """
     numbers, flat = indices(counts, "counts"), indices(views, "views")
     if numbers.ndim != 2:
         raise ArgumentError(f"counts has shape {numbers.shape}: must be (height, width)")
@@ -63,11 +65,15 @@ def write_consistency_graph(file: Path, counts: NDArray[Any], views: NDArray[Any
 
 
 def read_consistency_graph(file: Path) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
-    """Reads a consistency graph: how many views each pixel has, (height, width), and which, pixel after pixel."""
+    """Reads a consistency graph: how many views each pixel has, (height, width), and which, pixel after
+    pixel.
+    """
     width, height, total = ffi.new("uint32_t *"), ffi.new("uint32_t *"), ffi.new("size_t *")
     name, out = path(file, "file"), (width, height, total)
     check(lib.skep_read_consistency_graph(name, ffi.NULL, 0, ffi.NULL, 0, *out))
     counts = np.empty((height[0], width[0]), dtype=np.uint32)
     views = np.empty(total[0], dtype=np.uint32)
-    check(lib.skep_read_consistency_graph(name, pointer(counts), counts.size, pointer(views), views.size, *out))
+    check(
+        lib.skep_read_consistency_graph(name, pointer(counts), counts.size, pointer(views), views.size, *out)
+    )
     return counts, views

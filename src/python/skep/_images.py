@@ -34,7 +34,8 @@ class Image(NamedTuple):
 def image(pixels: NDArray[Any], order: Order) -> Image:
     """Pixels of shape (height, width) or (height, width, 1, 3 or 4); uint8, uint16, or float32 from 0 to 1.
 
-    They are read where they are when each row is without gaps, whatever lies between rows; else they are copied.
+    They are read where they are when each row is without gaps, whatever lies between rows; else they are
+    copied.
     """
     array = np.asarray(pixels)
     layout = None

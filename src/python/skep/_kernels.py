@@ -16,10 +16,10 @@ from ._native import ffi, lib
 
 
 def plane_through(camera: Camera, x: float, y: float, depth: float, normal: ArrayLike) -> NDArray[np.float64]:
-    """The plane with this unit normal through the point at `depth` behind a pixel, which need not be whole.
+    """The plane with this unit normal through the point of pixel (x, y), which may be fractional, at `depth`.
 
-    A plane is four numbers in the camera's frame: a unit normal that faces the camera, and a distance, so that
-    normal . X = -distance.
+    A plane is four numbers in the camera's frame: a unit normal that faces the camera, and a distance, so
+    that normal . X = -distance.
     """
     given = doubles(normal, (3,), "normal")
     plane = np.empty(4)
@@ -52,12 +52,12 @@ class PackedImage:
         self._handle = ffi.gc(out[0], lib.skep_packed_image_destroy)
 
 
-class Window:
+class NccWindow:
     """A square window of half side `radius`, sampled every `step` pixels. Never changes.
 
-    A sample weighs exp(-r^2 / (2 sigma_spatial^2) - dI^2 / (2 sigma_color^2)), r pixels and dI of gray from the
-    center; infinite sigmas, the default, weigh all alike. A patch of less weighted variance than `min_variance` has no
-    texture.
+    A sample weighs exp(-r^2 / (2 sigma_spatial^2) - dI^2 / (2 sigma_color^2)), r pixels and dI of gray from
+    the center; infinite sigmas, the default, give all samples the same weight. A patch whose weighted
+    variance is below `min_variance` has no texture.
     """
 
     __slots__ = ("_handle",)
@@ -78,16 +78,20 @@ class Window:
 
 
 def patch_ncc(
-    window: Window, reference: PackedImage, source: PackedImage, pixels: ArrayLike, homographies: ArrayLike
+    window: NccWindow, reference: PackedImage, source: PackedImage, pixels: ArrayLike, homographies: ArrayLike
 ) -> NDArray[np.float32]:
-    """Normalized cross-correlations of patches around `pixels` (n, 2) of the reference, x before y, with their images
-    in the source by `homographies` (n, 3, 3): -1 to 1; -1 also where either side has no texture.
+    """Normalized cross-correlations of patches around `pixels` (n, 2) of the reference, x before y, with
+    their images in the source by `homographies` (n, 3, 3): -1 to 1; -1 also where either side has no texture.
     """
     centers = indices(np.asarray(pixels), "pixels")
-    ways = doubles(homographies, (-1, 3, 3), "homographies")
-    if centers.shape != (len(ways), 2):
-        raise ArgumentError(f"pixels has shape {centers.shape}: must be ({len(ways)}, 2), one for each homography")
-    ncc = np.empty(len(ways), dtype=np.float32)
+    maps = doubles(homographies, (-1, 3, 3), "homographies")
+    if centers.shape != (len(maps), 2):
+        raise ArgumentError(
+            f"pixels has shape {centers.shape}: must be ({len(maps)}, 2), one for each homography"
+        )
+    ncc = np.empty(len(maps), dtype=np.float32)
     samples = reference._handle, source._handle
-    check(lib.skep_patch_ncc(window._handle, *samples, pointer(centers), pointer(ways), len(ways), pointer(ncc)))
+    check(
+        lib.skep_patch_ncc(window._handle, *samples, pointer(centers), pointer(maps), len(maps), pointer(ncc))
+    )
     return ncc

@@ -2,27 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, Literal, NamedTuple
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Literal
 
-from ._buffers import text
-from ._errors import ArgumentError, check
+import numpy as np
+
+from ._buffers import take_text, text
+from ._errors import check
 from ._native import ffi, lib
 
-
-class Scale(NamedTuple):
-    """The search on one scale of the image pyramid."""
-
-    halvings: int
-    """How often the images are halved: 0 is full size."""
-    foods: int
-    """Food sources of each pixel's colony, 2 to 64."""
-    first_iterations: int
-    """Iterations of the first cycle on this scale."""
-    cycles: int
-    """Cycles after the first."""
-    cycle_iterations: int
-    """Iterations of each of those."""
+Value = int | float | bool | str
+"""The value of an option."""
 
 
 def _names() -> Iterator[str]:
@@ -33,47 +23,200 @@ def _names() -> Iterator[str]:
 
 
 _NAMES = tuple(_names())
-_ATTRIBUTES = {name.replace(".", "_"): name for name in _NAMES}
 
 
-class Options(Mapping[str, float]):
-    """Options by name, as items or attributes: `options["fusion.min_views"]` is `options.fusion_min_views`.
+def _by_any_name() -> dict[str, str]:
+    """The full name of an option by each name that stands for it."""
+    fields = [name.rpartition(".")[2] for name in _NAMES]
+    full = {field: name for field, name in zip(fields, _NAMES) if fields.count(field) == 1}
+    full |= {name.replace(".", "_"): name for name in _NAMES}
+    return full | {name: name for name in _NAMES}
 
-    Starts from a preset: "default", which measures best, "fast", which takes less than half of its time, or "paper",
-    which follows the paper to the letter. `Options(threads=2, fusion_min_views=2)` sets some at once. Numbers are checked when they are set.
+
+_BY_ANY_NAME = _by_any_name()
+
+
+class Options(Mapping[str, Value]):
+    """Options by name, as items or attributes.
+
+    `options["check.depth_tolerance"]` is `options.check_depth_tolerance`. The group may be left out where no
+    other group has an option of that name: `options.window_radius`. Values are checked when they are set.
+
+    Starts from a preset: "default" is the most accurate, "fast" takes less than half of its time, "paper"
+    follows the paper literally. `Options("fast", threads=2, fusion_min_views=2)` sets some at once.
     """
 
     __slots__ = ("_handle",)
 
     _handle: Any
 
-    def __init__(
-        self,
-        preset: Literal["default", "fast", "paper"] = "default",
-        *,
-        seed: int = 0,
-        scales: Iterable[Scale | tuple[int, int, int, int, int]] | None = None,
-        **values: float,
-    ) -> None:
+    # BEGIN OPTIONS
+    seed: int
+    """Seed of the random generator; the same seed gives the same bits. (whole number, 0 to
+    18446744073709551615, any; default: 0)"""
+    threads: int
+    """Worker threads; 0 takes one for each core. The result does not depend on it. (whole number, 0 to 4096,
+    threads; default: 0)"""
+    simd: str
+    """Instruction set: scalar, baseline, v3, or best for the best the machine has; the result does not depend
+    on it. (name; default: best)"""
+    schedule_scales: str
+    """Scales from coarse to fine, each twice as large as the one before, the last at full size: `downscale=2
+    food_sources=3 iterations=5+4x1; downscale=1 food_sources=2 iterations=1+2x1` is half size with 3 food
+    sources a pixel, 5 iterations in the first cycle and 4 more cycles of 1, then full size. (text; default:
+    downscale=2 food_sources=3 iterations=5+4x1; downscale=1 food_sources=2 iterations=1+2x1, fast:
+    downscale=2 food_sources=2 iterations=4+3x1; downscale=1 food_sources=2 iterations=0+0x1, paper:
+    downscale=1 food_sources=10 iterations=20+3x2)"""
+    schedule_min_changed_fraction: float
+    """A scale ends early once fewer than this fraction of the pixels changed in a cycle. (number, 0 to 1,
+    fraction of the pixels; default: 0.01)"""
+    window_window_radius: int
+    """Half the side of the window. (whole number, 1 to 16, pixels; default: 5)"""
+    window_full_size_window_radius: int
+    """The same at full size after coarser scales, where the window is a square; 0 keeps `window_radius`.
+    (whole number, 0 to 16, pixels; default: 3, paper: 0)"""
+    window_window_step: int
+    """Distance between the samples of the window. (whole number, 1 to 8, pixels; default: 2)"""
+    window_circular_window: bool
+    """Leave out the corners of the window: a disc of samples instead of a square. (switch, true or false;
+    default: true, paper: false)"""
+    window_sigma_spatial: float
+    """Sigma of the bilateral weight in space. (number, 0.001 to 1000000, pixels; default: 3, paper: 5)"""
+    window_sigma_color: float
+    """Sigma of the bilateral weight in gray value. (number, 0.001 to 1000000, gray value, of [0, 1]; default:
+    0.03, paper: 0.2)"""
+    window_min_variance: float
+    """Weighted variance under which a window has no texture and costs 2. (number, 0 to 1, squared gray value,
+    of [0, 1]; default: 0.00001)"""
+    window_min_texture_to_noise: float
+    """Ratio of the window's variance to the image noise under which the pixel is not matched but filled from
+    the surrounding planes; 0 matches all pixels. (number, 0 to 1000, ratio of variances; default: 2.5, paper:
+    0)"""
+    cost_best_views: int
+    """Mean over the best views of the pixel's view set; 0 takes the sum over all divided by one less than
+    their number (equation 3 of the paper). (whole number, 0 to 8, views; default: 4, fast: 3, paper: 0)"""
+    cost_max_views_per_pixel: int
+    """From the second cycle on, match a pixel only with this many views of its set, those of lowest cost; 0
+    takes the whole set. (whole number, at least 0, views; default: 5, fast: 4, paper: 0)"""
+    cost_geom_consistency_weight: float
+    """Geometric consistency: cost at the largest error against the validated depth of a source view; 0 turns
+    the term off. (number, 0 to 1000, cost; default: 0.3, paper: 0)"""
+    cost_geom_consistency_max_error: float
+    """Relative depth error against a source view's validated depth at which the penalty saturates; quadratic
+    below. (number, 0.00001 to 10, fraction of the depth; default: 0.02, paper: 0.03)"""
+    cost_geom_consistency_missing_error: float
+    """Relative depth error that is assumed where the source view has no validated depth. (number, 0 to 10,
+    fraction of the depth; default: 0.0175, paper: 0.015)"""
+    cost_smoothness_weight: float
+    """Smoothness: cost of a plane that contradicts the validated planes of all four neighbors of similar gray
+    value; 0 turns the term off. (number, 0 to 1000, cost; default: 0.1, fast: 0.2, paper: 0)"""
+    cost_smoothness_max_depth_error: float
+    """Relative depth error against a neighbor's plane at which the smoothness penalty saturates; quadratic
+    below. (number, 0.000001 to 1, fraction of the depth; default: 0.01)"""
+    cost_smoothness_max_normal_error: float
+    """Angle to a neighbor's normal at which the smoothness penalty saturates; quadratic in 1 - cos below.
+    (number, 0.001 to 180, degrees; default: 40)"""
+    search_trial_limit: int
+    """Failed attempts to improve a food source after which a scout bee may replace it. (whole number, at
+    least 0, attempts; default: 10)"""
+    search_employed_bees: int
+    """From the second cycle on, the number of food sources, best first, that employed bees perturb; 0 takes
+    all. (whole number, 0 to 64, food sources; default: 1, paper: 0)"""
+    search_onlooker_tournament_size: int
+    """Random neighbors of which an onlooker bee visits the one of lowest cost; different gray values raise
+    the cost. (whole number, 1 to 20, neighbors; default: 3, fast: 6, paper: 1)"""
+    search_local_plane_tolerance: float
+    """Relative inverse-depth error up to which a neighbor takes part in the local plane fit of each
+    iteration; 0 fits no planes. (number, 0 to 1, fraction of the inverse depth; default: 0.02, fast: 0.03,
+    paper: 0)"""
+    search_depth_perturbation: float
+    """From the second cycle on, half the range of inverse depths in which food sources start around the
+    previous estimate, halved each cycle; 0 starts them at random. (number, 0 to 0.5, fraction of the inverse
+    depth; default: 0.01, fast: 0.005, paper: 0)"""
+    search_normal_perturbation: float
+    """Half the side of the cube from which a vector is added to the normals of those food sources, halved
+    each cycle. (number, 0 to 10, length, of a unit normal; default: 0.3, paper: 0)"""
+    search_smoothness_reward: float
+    """Fitness bonus of a plane that comes from a validated neighbor, in the comparison only (section 5.6 of
+    the paper); 0 turns it off. (number, 0 to 1, fitness; default: 0.05)"""
+    search_view_propagation: bool
+    """Propagate consistent planes to the pixels of other views that have no validated plane. (switch, true or
+    false; default: true)"""
+    view_selection_pixelwise_view_selection: bool
+    """Refine the view set of each pixel by incident angle and visibility; off keeps all source views.
+    (switch, true or false; default: true)"""
+    view_selection_min_triangulation_angle: float
+    """Smallest triangulation angle of a source view. (number, 0 to 180, degrees; default: 4, paper: 10)"""
+    view_selection_max_triangulation_angle: float
+    """Largest triangulation angle of a source view. (number, 0 to 180, degrees; default: 40, paper: 30)"""
+    view_selection_max_sources: int
+    """Source views of a view, those of smallest triangulation angle; 0 takes all. (whole number, at least 0,
+    views; default: 12, fast: 8, paper: 0)"""
+    view_selection_max_incident_angle: float
+    """Largest angle between the normal and the ray to a source view. (number, 0 to 90, degrees; default:
+    80)"""
+    view_selection_occlusion_tolerance: float
+    """Relative depth by which a validated surface of a source view must lie in front of a point to occlude
+    it. (number, 0 to 1, fraction of the depth; default: 0.01)"""
+    check_depth_tolerance: float
+    """Largest relative depth difference of consistent planes. (number, 0 to 1, fraction of the depth;
+    default: 0.01)"""
+    check_normal_tolerance: float
+    """Largest angle between the normals of consistent planes. (number, 0 to 180, degrees; default: 30)"""
+    check_min_consistent_views: int
+    """Source views that must be consistent to validate a plane; with 1 and `best_views` a single source view
+    is enough to match a pixel, as scenes of two views need. (whole number, at least 1, views; default: 2)"""
+    check_min_consistent_fraction: float
+    """Fraction of the pixel's view set that must be consistent to validate a plane. (number, 0 to 1, fraction
+    of the view set; default: 0.5, paper: 0.7)"""
+    check_ignore_occluders: bool
+    """Leave source views whose own depth is clearly smaller out of that fraction: they may be occluded there.
+    (switch, true or false; default: true, paper: false)"""
+    refine_fattening_passes: int
+    """Passes of the correction of foreground fattening after the last check of each scale; 0 turns it off.
+    (whole number, 0 to 100, passes; default: 2, paper: 0)"""
+    refine_smoothing_passes: int
+    """Passes of plane smoothing after each check; 0 turns it off. (whole number, 0 to 100, passes; default:
+    1, fast: 2, paper: 0)"""
+    refine_cross_view_averaging: bool
+    """Average validated planes with those of the source views after the last cycle. (switch, true or false;
+    default: true, paper: false)"""
+    refine_fill_gaps: bool
+    """Fill small gaps from the surrounding planes after the last cycle, where the source views confirm them.
+    (switch, true or false; default: true, paper: false)"""
+    fusion_depth_tolerance: float
+    """Largest relative depth difference of pixels that are fused. (number, 0 to 1, fraction of the depth;
+    default: 0.01)"""
+    fusion_normal_tolerance: float
+    """Largest angle between the normals of pixels that are fused. (number, 0 to 180, degrees; default: 30)"""
+    fusion_min_views: int
+    """Other views that must agree with a pixel to make a point. (whole number, at least 0, views; default: 3,
+    paper: 4)"""
+    # END OPTIONS
+
+    def __init__(self, preset: Literal["default", "fast", "paper"] = "default", **values: Value) -> None:
         out = ffi.new("skep_options **")
         check(lib.skep_options_create(text(preset, "preset"), out))
         object.__setattr__(self, "_handle", ffi.gc(out[0], lib.skep_options_destroy))
-        self.seed = seed
-        if scales is not None:
-            self.scales = tuple(Scale(*scale) for scale in scales)
         for name, value in values.items():
-            self[_ATTRIBUTES.get(name, name)] = value
+            self[name] = value
 
-    def __getitem__(self, name: str) -> float:
-        if name not in _NAMES:
+    def __getitem__(self, name: str) -> Value:
+        if name not in _BY_ANY_NAME:
             raise KeyError(name)
-        value = ffi.new("double *")
-        check(lib.skep_options_get(self._handle, name.encode(), value))
-        number: float = value[0]
-        return number
+        full = _BY_ANY_NAME[name]
+        value = take_text(lambda *out: lib.skep_options_get_text(self._handle, full.encode(), *out))
+        return _TYPES[full](value)
 
-    def __setitem__(self, name: str, value: float) -> None:
-        check(lib.skep_options_set(self._handle, text(name, "name"), value))
+    def __setitem__(self, name: str, value: Value) -> None:
+        full = text(_BY_ANY_NAME.get(name, name), "name")
+        if isinstance(value, bool | np.bool_):
+            value = str(value).lower()
+        # A text holds every whole number, and the shortest text of a float is read back to the bit.
+        check(lib.skep_options_set_text(self._handle, full, text(str(value), name)))
+
+    def __contains__(self, name: object) -> bool:
+        return name in _BY_ANY_NAME
 
     def __iter__(self) -> Iterator[str]:
         return iter(_NAMES)
@@ -81,58 +224,31 @@ class Options(Mapping[str, float]):
     def __len__(self) -> int:
         return len(_NAMES)
 
-    def __getattr__(self, attribute: str) -> float:
-        if attribute not in _ATTRIBUTES:
+    def __getattr__(self, attribute: str) -> Value:
+        if attribute not in _BY_ANY_NAME:
             raise AttributeError(f"there is no option {attribute!r}")
-        return self[_ATTRIBUTES[attribute]]
+        return self[attribute]
 
-    def __setattr__(self, attribute: str, value: Any) -> None:
-        if attribute in _ATTRIBUTES:
-            self[_ATTRIBUTES[attribute]] = value
-        elif hasattr(type(self), attribute):
-            object.__setattr__(self, attribute, value)
-        else:
+    def __setattr__(self, attribute: str, value: Value) -> None:
+        if attribute not in _BY_ANY_NAME:
             raise AttributeError(f"there is no option {attribute!r}")
+        self[attribute] = value
 
     def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *_ATTRIBUTES]
+        return [*super().__dir__(), *(name for name in _BY_ANY_NAME if name.isidentifier())]
 
     def __repr__(self) -> str:
-        return f"Options({dict(self)}, seed={self.seed}, scales={list(self.scales)})"
+        return f"Options({dict(self)})"
 
-    @property
-    def seed(self) -> int:
-        """Of the random generator. The same seed, input and library version give the same bits."""
-        seed = ffi.new("uint64_t *")
-        check(lib.skep_options_get_seed(self._handle, seed))
-        return int(seed[0])
 
-    @seed.setter
-    def seed(self, seed: int) -> None:
-        if not 0 <= seed < 1 << 64:
-            raise ArgumentError(f"seed is {seed}: must be a whole number from 0 to 2^64 - 1")
-        check(lib.skep_options_set_seed(self._handle, seed))
+def _switch(value: str) -> bool:
+    return value == "true"
 
-    @property
-    def scales(self) -> tuple[Scale, ...]:
-        """From coarse to fine: halvings descend one by one to 0."""
-        count = ffi.new("size_t *")
-        check(lib.skep_options_get_scales(self._handle, ffi.NULL, 0, count))
-        found = ffi.new("skep_scale[]", count[0])
-        check(lib.skep_options_get_scales(self._handle, found, count[0], count))
-        return tuple(Scale(*(getattr(scale, field) for field in Scale._fields)) for scale in found)
 
-    @scales.setter
-    def scales(self, scales: Iterable[Scale | tuple[int, int, int, int, int]]) -> None:
-        wanted = [Scale(*scale) for scale in scales]
-        given = ffi.new("skep_scale[]", [scale._asdict() for scale in wanted])
-        check(lib.skep_options_set_scales(self._handle, given, len(wanted)))
-
-    def set_simd(self, level: Literal["scalar", "base", "v3"] | None) -> None:
-        """The instruction set; None is the best the machine has. Results do not depend on it."""
-        check(lib.skep_options_set_simd(self._handle, ffi.NULL if level is None else text(level, "level")))
+_FROM_TEXT: dict[str, Callable[[str], Value]] = {"int": int, "float": float, "bool": _switch, "str": str}
+_TYPES = {name: _FROM_TEXT[Options.__annotations__[name.replace(".", "_")]] for name in _NAMES}
 
 
 def handle(options: Options | None) -> Any:
-    """For the library; None are the defaults."""
+    """The options as the library takes them; None is the default preset."""
     return ffi.NULL if options is None else options._handle

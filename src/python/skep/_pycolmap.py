@@ -15,10 +15,11 @@ from ._scene import Scene
 def from_pycolmap(
     reconstruction: Any, image_folder: str | os.PathLike[str], depth_range: tuple[float, float] | None = None
 ) -> Scene:
-    """A scene of a `pycolmap.Reconstruction`: its images that have a pose, in the order of their ids, and its points.
+    """A scene of a `pycolmap.Reconstruction`: its images that have a pose, in the order of their ids, and its
+    points.
 
-    The cameras must be PINHOLE or SIMPLE_PINHOLE; `pycolmap.undistort_images` makes them so. `depth_range` is that of
-    every view; None takes it from the points.
+    The cameras must be PINHOLE or SIMPLE_PINHOLE; `pycolmap.undistort_images` makes them so. `depth_range` is
+    that of every view; None takes it from the points.
     """
     import pycolmap
 

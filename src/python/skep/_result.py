@@ -1,4 +1,4 @@
-"""Whole runs, and what they give for each view."""
+"""Whole runs and their results."""
 
 from __future__ import annotations
 
@@ -26,39 +26,39 @@ T = TypeVar("T")
 
 
 class PixelStatus(IntEnum):
-    """What became of a pixel: the reason where there is no validated depth."""
+    """Status of a pixel: validated, or the reason why it is not."""
 
     VALIDATED = lib.SKEP_PIXEL_VALIDATED
-    """The solution is consistent with enough source views."""
+    """The plane is consistent with enough source views."""
     MASKED = lib.SKEP_PIXEL_MASKED
-    """The mask leaves the pixel out."""
+    """The mask excludes the pixel."""
     NO_TEXTURE = lib.SKEP_PIXEL_NO_TEXTURE
-    """The window around the pixel is too uniform to be matched."""
+    """The variance in the window around the pixel is too small for matching."""
     NO_SOURCES = lib.SKEP_PIXEL_NO_SOURCES
-    """Fewer than two source views can see the solution."""
+    """The plane is visible in fewer than two source views."""
     INCONSISTENT = lib.SKEP_PIXEL_INCONSISTENT
-    """Too few source views agree with the solution."""
+    """Too few source views are consistent with the plane."""
     OUT_OF_RANGE = lib.SKEP_PIXEL_OUT_OF_RANGE
-    """The solution lies at an end of the depth range: the surface may lie beyond."""
+    """The depth is at an end of the depth range: the surface may lie outside of it."""
 
 
 @dataclass(frozen=True)
 class Statistics:
-    """What a view cost and what became of its pixels. Counts do not depend on the machine."""
+    """Work spent on a view and status of its pixels. The numbers do not depend on the machine."""
 
     ncc_evaluations: int
-    """Patches compared with a patch in one source view."""
-    samples: int
+    """Comparisons of a patch with its image in one source view."""
+    bilinear_samples: int
     """Bilinear samples taken from source views."""
     early_terminations: int
-    """Hypotheses given up before all their source views were looked at."""
-    pixels: Mapping[PixelStatus, int]
+    """Plane evaluations that ended before all source views were compared."""
+    status_counts: Mapping[PixelStatus, int]
     """Number of pixels of each status."""
 
 
 @dataclass(frozen=True)
-class Cycle:
-    """One cycle's search of one view."""
+class CycleRecord:
+    """The search and the check of one view in one cycle."""
 
     downscale: int
     """Size of the images: 1 is full, 2 half, 4 a quarter."""
@@ -67,7 +67,7 @@ class Cycle:
     pixels: int
     """Pixels searched."""
     changed: int
-    """Pixels whose solution changed."""
+    """Pixels whose depth changed by more than 0.1 %."""
     validated: int
     """Pixels validated by the check after it."""
 
@@ -75,8 +75,8 @@ class Cycle:
 class ResultView:
     """The maps of one view.
 
-    Raw maps are read-only arrays that look into the result, which lives as long as they do; the others are copies, made
-    when they are first asked for.
+    Raw maps are read-only arrays of the result's own memory, which lives as long as they do; the others are
+    copies, made at the first access.
     """
 
     def __init__(self, handle: Any, view: int) -> None:
@@ -108,27 +108,29 @@ class ResultView:
 
     @cached_property
     def normal(self) -> NDArray[np.float32]:
-        """Raw unit normals in the view's camera frame, facing the camera, zeros where none; (height, width, 3)."""
+        """Raw unit normals in the view's camera frame, facing the camera, zeros where none; (height, width,
+        3).
+        """
         return self._borrow(lib.skep_result_borrow_normal, "float", np.float32, 3)
 
     @cached_property
     def cost(self) -> NDArray[np.float32]:
-        """The mean of 1 - NCC over each pixel's source views, 0 to 2; lower is surer."""
+        """Matching cost of the raw plane of every pixel: mean of 1 - NCC over its source views, 0 to 2."""
         return self._borrow(lib.skep_result_borrow_cost, "float", np.float32)
 
     @cached_property
     def status(self) -> NDArray[np.uint8]:
-        """What became of every pixel: values of `PixelStatus`."""
+        """Status of every pixel: values of `PixelStatus`."""
         return self._borrow(lib.skep_result_borrow_status, "uint8_t", np.uint8)
 
     @cached_property
     def validated_depth(self) -> NDArray[np.float32]:
-        """The depth that other views confirm, 0 elsewhere."""
+        """The depth of validated pixels, 0 elsewhere."""
         return self._copy(lib.skep_result_get_depth, (lib.SKEP_MAPS_VALIDATED,), np.float32)
 
     @cached_property
     def validated_normal(self) -> NDArray[np.float32]:
-        """The normals that other views confirm, zeros elsewhere."""
+        """The normals of validated pixels, zeros elsewhere."""
         return self._copy(lib.skep_result_get_normal, (lib.SKEP_MAPS_VALIDATED,), np.float32, 3)
 
     @cached_property
@@ -152,24 +154,26 @@ class ResultView:
 
     @cached_property
     def statistics(self) -> Statistics:
-        """What the view cost and what became of its pixels."""
+        """Work spent on the view and status of its pixels."""
         found = ffi.new("skep_statistics *")
         check(lib.skep_result_get_statistics(self._handle, self.view, found))
-        pixels = {status: found.status_counts[status] for status in PixelStatus}
-        return Statistics(found.ncc_evaluations, found.samples, found.early_terminations, pixels)
+        counts = {status: found.status_counts[status] for status in PixelStatus}
+        return Statistics(found.ncc_evaluations, found.bilinear_samples, found.early_terminations, counts)
 
     @cached_property
-    def cycles(self) -> tuple[Cycle, ...]:
+    def cycles(self) -> tuple[CycleRecord, ...]:
         """The cycles of the view in order."""
         count = ffi.new("size_t *")
         check(lib.skep_result_get_cycles(self._handle, self.view, ffi.NULL, 0, count))
         found = ffi.new("skep_cycle_record[]", count[0])
         check(lib.skep_result_get_cycles(self._handle, self.view, found, count[0], count))
-        return tuple(Cycle(one.downscale, one.cycle, one.pixels, one.changed, one.validated) for one in found)
+        return tuple(
+            CycleRecord(one.downscale, one.cycle, one.pixels, one.changed, one.validated) for one in found
+        )
 
 
 class Result:
-    """What a whole run gives: `result[view]` are the maps of a view, `len(result)` the number of views."""
+    """Result of a whole run: `result[view]` holds the maps of a view, `len(result)` counts the views."""
 
     def __init__(self, handle: Any) -> None:
         self._handle = handle
@@ -200,13 +204,15 @@ class Result:
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences about the run that its user should read."""
+        """Warnings of the run for its user, such as views without any source view."""
         ask = lib.skep_result_get_warning
         warning = lambda number: take_text(lambda *out: ask(self._handle, number, *out))
         return tuple(_until_refused(warning))
 
     def write_workspace(self, scene: Scene, folder: str | os.PathLike[str]) -> None:
-        """Writes what COLMAP calls a dense folder, less images/ and sparse/, which `Scene.write_colmap` writes."""
+        """Writes what COLMAP calls a dense folder, less images/ and sparse/, which `Scene.write_colmap`
+        writes.
+        """
         check(lib.skep_result_write_workspace(self._handle, scene._handle, path(folder, "folder")))
 
 
@@ -219,11 +225,13 @@ def _until_refused(item: Callable[[int], T]) -> Iterator[T]:
             return
 
 
-def reconstruct(scene: Scene, options: Options | None = None, progress: ProgressFunction | None = None) -> Result:
-    """Estimates depth, normal and source views of every pixel of every view, and fuses what was validated.
+def reconstruct(
+    scene: Scene, options: Options | None = None, progress: ProgressFunction | None = None
+) -> Result:
+    """Estimates depth, normal and source views of every pixel of every view, and fuses the validated pixels.
 
-    `progress` is called in this thread; a true answer cancels the run, which raises `Cancelled`. An exception, as is
-    KeyboardInterrupt, cancels it too.
+    `progress` is called in this thread; a true answer cancels the run, which raises `Cancelled`. An
+    exception, as is KeyboardInterrupt, cancels it too.
     """
     chosen = _options.handle(options)
     call = lambda *hook: lib.skep_reconstruct(scene._handle, chosen, *hook)

@@ -1,8 +1,9 @@
-"""Long calls: their progress, and how they are stopped.
+"""Long calls: progress and cancellation.
 
-The library calls back from threads of its own, where Python handles no signals, and while the calling thread waits in
-C it handles none either. So the call is made in a thread of its own, and the calling thread waits in Python: there it
-shows progress, and a signal's handler can raise, as KeyboardInterrupt does, which stops the call.
+The library calls back from threads of its own, where Python handles no signals, and while the calling thread
+waits in C it handles none either. So the call is made in a thread of its own, and the calling thread waits in
+Python: there it calls the progress function, and a signal's handler can raise, as KeyboardInterrupt does,
+which stops the call.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from ._native import ffi, lib
 
 
 class Phase(IntEnum):
-    """What is being done."""
+    """Stage of a call."""
 
     SEARCH = lib.SKEP_PHASE_SEARCH
     CHECK = lib.SKEP_PHASE_CHECK
@@ -27,23 +28,23 @@ class Phase(IntEnum):
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a call stands."""
+    """Progress of a call."""
 
     done: float
-    """Share of the whole call that is done, 0 to 1."""
+    """Fraction of the work of the call that is done, 0 to 1."""
     phase: Phase
     downscale: int
     """Size of the images searched: 1 is full, 2 half, 4 a quarter."""
     cycle: int
     """The cycle on this scale, counted from 0."""
     view: int
-    """The view at work."""
+    """The view that is worked on."""
     view_count: int
 
 
 ProgressFunction = Callable[[Progress], object]
-"""Called in the thread that made the call, whenever there is news and it is idle. What is true cancels the call, which
-then raises `Cancelled`; an exception cancels it too, and is raised from it."""
+"""Called in the thread that made the call, whenever there is news and it is idle. What is true cancels the
+call, which then raises `Cancelled`; an exception cancels it too, and is raised from it."""
 
 
 class _Call:
@@ -60,10 +61,10 @@ class _Call:
         self.thread = threading.Thread(target=self.make, args=(call, kind), name="skep")
 
     def make(self, call: Callable[[Any, Any, Any], int], kind: str) -> None:
-        callback = ffi.callback("skep_progress_fn", self.hear, error=1)
+        callback = ffi.callback("skep_progress_fn", self.receive, error=1)
         out = ffi.new(f"{kind} **")
         try:
-            # Here, because the text of an error is told to the thread that met it.
+            # Here, because the text of an error is kept for the thread that made the call.
             check(call(callback, ffi.NULL, out))
             self.found = ffi.gc(out[0], getattr(lib, f"{kind}_destroy"))
         except BaseException as failure:
@@ -72,7 +73,7 @@ class _Call:
             self.ended = True
             self.news.notify()
 
-    def hear(self, _user: Any, progress: Any) -> int:
+    def receive(self, _user: Any, progress: Any) -> int:
         with self.news:
             self.latest = Progress(
                 done=progress.done,
@@ -85,8 +86,8 @@ class _Call:
             self.news.notify()
             return int(self.cancelled)
 
-    def tell(self, function: ProgressFunction) -> None:
-        """Shows the caller what is new until the call ends or the caller has seen enough."""
+    def report(self, function: ProgressFunction) -> None:
+        """Calls the progress function with the latest progress until the call ends or is cancelled."""
         while not self.cancelled:
             with self.news:
                 while self.latest is None and not self.ended:
@@ -99,13 +100,13 @@ class _Call:
 
 
 def run(call: Callable[[Any, Any, Any], int], kind: str, progress: ProgressFunction | None) -> Any:
-    """Makes `call(progress_function, user, out)` and waits until it has ended; gives the object of this kind that it
-    put out, or raises what it came to.
+    """Makes `call(progress_function, user, out)` and waits until it has ended; gives the object of this kind
+    that it created, or raises its error.
     """
     under_way = _Call(call, kind)
     try:
         under_way.thread.start()
-        under_way.tell(progress or (lambda _: False))
+        under_way.report(progress or (lambda _: False))
     except BaseException:
         under_way.cancelled = True
         raise

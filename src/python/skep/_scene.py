@@ -34,10 +34,12 @@ class Scene:
         self._handle = ffi.gc(out[0], lib.skep_scene_destroy)
 
     @classmethod
-    def read_colmap(cls, folder: str | os.PathLike[str], depth_range: tuple[float, float] | None = None) -> Scene:
+    def read_colmap(
+        cls, folder: str | os.PathLike[str], depth_range: tuple[float, float] | None = None
+    ) -> Scene:
         """Reads a folder with images/ and a COLMAP model in sparse/ or sparse/0/.
 
-        `depth_range` is that of every view; None takes it from the sparse points.
+        `depth_range` is that of every view; None derives it from the sparse points.
         """
         near, far = depth_range or (0.0, 0.0)
         out = ffi.new("skep_scene **")
@@ -60,10 +62,10 @@ class Scene:
         mask: NDArray[Any] | None = None,
         depth_range: tuple[float, float] | None = None,
     ) -> int:
-        """Adds a photograph, copied, and tells its number.
+        """Adds a photograph, which is copied, and returns its number.
 
-        `image` has shape (height, width) or (height, width, 1, 3 or 4) and type uint8, uint16, or float32 from 0 to 1;
-        `order` is that of its channels. Rows may lie apart, as in a part of a larger image.
+        `image` has shape (height, width) or (height, width, 1, 3 or 4) and type uint8, uint16, or float32
+        from 0 to 1; `order` is that of its channels. Rows may lie apart, as in a part of a larger image.
         """
         given = to_image(image, order)
         # A view that was added stays: what could be refused later is tried before.
@@ -82,7 +84,7 @@ class Scene:
         return number
 
     def set_mask(self, view: int, mask: NDArray[Any] | None) -> None:
-        """Says where depths are wanted, by booleans or bytes; None takes the mask away.
+        """Sets the mask of a view: true or not 0 where depths are estimated; None removes it.
 
         Masked pixels still serve as sources for other views.
         """
@@ -94,14 +96,14 @@ class Scene:
         check(lib.skep_scene_set_mask(self._handle, view, given.pointer, given.stride))
 
     def set_depth_range(self, view: int, depth_range: tuple[float, float] | None) -> None:
-        """Says between which depths surfaces are looked for; None goes back to what the sparse points suggest."""
+        """Sets the depth range of a view; None derives it from the sparse points, which is the default."""
         near, far = depth_range or (0.0, 0.0)
         check(lib.skep_scene_set_depth_range(self._handle, index(view, "view"), near, far))
 
     def set_sources(self, view: int, sources: Iterable[int] | None) -> None:
-        """Says which views a view is matched with, the most important first; they may be added later.
+        """Sets the source views of a view, the most important first; they may be added later.
 
-        None goes back to choosing them by their triangulation angle.
+        None selects them by triangulation angle, the default.
         """
         given = indices(sources or (), "sources")
         check(lib.skep_scene_set_sources(self._handle, index(view, "view"), pointer(given), given.size))
@@ -109,12 +111,14 @@ class Scene:
     def add_points(self, positions: ArrayLike, views: Sequence[Iterable[int]]) -> None:
         """Adds sparse points of shape (n, 3) with the views that saw each of them, which may be added later.
 
-        Points give the depth ranges and choose the source views; without any, give each view a depth range.
+        Depth ranges and source views are derived from the points; without any, give each view a depth range.
         """
         points = doubles(positions, (-1, 3), "positions")
         lists = [indices(seen, "views") for seen in views]
         if len(lists) != len(points):
-            raise ArgumentError(f"views are {len(lists)} lists: must be one for each of the {len(points)} points")
+            raise ArgumentError(
+                f"views are {len(lists)} lists: must be one for each of the {len(points)} points"
+            )
         counts = np.array([seen.size for seen in lists], dtype=np.uint32)
         flat = np.concatenate(lists) if lists else np.zeros(0, dtype=np.uint32)
         check(
@@ -154,7 +158,7 @@ class Scene:
         return take_text(lambda *out: lib.skep_scene_get_name(self._handle, view, *out))
 
     def depth_range(self, view: int) -> tuple[float, float]:
-        """What a run would search: the view's own, or what its sparse points suggest."""
+        """The depth range that a run searches: the view's own, or the one derived from the sparse points."""
         near, far = ffi.new("double *"), ffi.new("double *")
         check(lib.skep_scene_get_depth_range(self._handle, index(view, "view"), near, far))
         return near[0], far[0]
@@ -166,12 +170,14 @@ class Scene:
         return take_indices(lambda *out: lib.skep_scene_get_sources(self._handle, chosen, view, *out))
 
     def overlap(self, view: int) -> tuple[int, ...]:
-        """The views that may see the same surface as a view, which is what fusion asks."""
+        """The views that fusion compares with a view: those that share a sparse point with it, else all
+        others.
+        """
         index(view, "view")
         return take_indices(lambda *out: lib.skep_scene_get_overlap(self._handle, view, *out))
 
     def triangulation_angle(self, reference: int, source: int) -> float | None:
-        """The angle of two views in degrees; None when they see nothing together."""
+        """The angle of two views in degrees; None when they share no surface."""
         degrees = ffi.new("double *")
         views = index(reference, "reference"), index(source, "source")
         check(lib.skep_scene_get_triangulation_angle(self._handle, *views, degrees))

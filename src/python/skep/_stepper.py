@@ -1,4 +1,4 @@
-"""A run taken apart, for hosts that schedule views themselves or bring maps of their own."""
+"""The stages of a run on single views, for hosts that schedule views themselves or have maps of their own."""
 
 from __future__ import annotations
 
@@ -25,35 +25,35 @@ class Cycle:
 
     downscale: int
     """Size of the images: 1 is full, 2 half, 4 a quarter."""
-    cycle: int
+    cycle_on_scale: int
     """The cycle on that scale, counted from 0."""
-    foods: int
+    food_sources: int
     """Food sources of each pixel's colony."""
     iterations: int
     """Rounds of bees."""
 
 
 @dataclass(frozen=True)
-class StateInfo:
-    """What a estimate is."""
+class EstimateInfo:
+    """Identity and numbers of an estimate."""
 
     view: int
-    step: int
-    """The step it was searched in, or whose scale it was handed up to."""
+    cycle: int
+    """The cycle it was searched in, or the cycle to whose scale it was upsampled."""
     is_checked: bool
-    """Whether it carries the verdicts of a check."""
+    """Whether `Stepper.check` has been applied."""
     pixels: int
     changed: int
-    """Pixels whose solution the last search changed."""
+    """Pixels whose depth the last search changed by more than 0.1 %."""
     validated: int
-    """Pixels the last check validated."""
+    """Pixels that the last check validated."""
     ncc_evaluations: int
-    """Spent on the view so far."""
+    """NCC evaluations of the view so far."""
 
 
 @dataclass(frozen=True, eq=False)
-class StateMaps:
-    """Copies of a estimate's maps."""
+class EstimateMaps:
+    """Copies of the maps of an estimate."""
 
     depth: NDArray[np.float32]
     """0 where there is none."""
@@ -61,11 +61,11 @@ class StateMaps:
     cost: NDArray[np.float32]
     """The aggregated cost of the search."""
     validated: NDArray[np.bool_]
-    """Where the check validated the solution."""
+    """Where the check validated the plane."""
 
 
 class Estimate:
-    """What is known of one view after it was searched in a step or, once checked, after the check. Never changes."""
+    """The maps of one view after `Stepper.search` or `Stepper.check`. Never changes."""
 
     __slots__ = ("_handle", "size")
 
@@ -76,35 +76,42 @@ class Estimate:
 
     @staticmethod
     def load(stepper: Stepper, saved: bytes) -> Estimate:
-        """A estimate that was saved by the same version of the library, for stepper of the same scene and options."""
+        """Loads an estimate that the same version of the library saved, for a stepper of the same scene and
+        options.
+        """
         given = ffi.from_buffer("uint8_t[]", saved)
         return stepper._take(lambda out: lib.skep_estimate_load(stepper._handle, given, len(given), out))
 
     @staticmethod
     def from_maps(
         stepper: Stepper,
-        step: int,
+        cycle: int,
         view: int,
         depth: ArrayLike,
         normal: ArrayLike,
         validated: ArrayLike | None = None,
         cost: ArrayLike | None = None,
     ) -> Estimate:
-        """A estimate from the caller's own maps, as if it had been checked in `step`, of the size `Stepper.size` tells.
+        """Makes a checked estimate of `cycle` from the caller's own maps, which have the size `Stepper.size`
+        returns.
 
-        `validated` is true where the solution counts as such; None validates all that have a depth.
+        `depth` in world units, 0 where there is none; `normal` (height, width, 3), unit, in the camera frame,
+        facing the camera. `validated` is true where the plane counts as validated; None validates every
+        depth. `cost` ranks the planes in the propagation to other views; None is 0.
         """
-        width, height = stepper.size(step, view)
+        width, height = stepper.size(cycle, view)
         shape = (height, width)
-        judged = None if validated is None else np.asarray(validated, dtype=bool).view(np.uint8)
+        flags = None if validated is None else np.asarray(validated, dtype=bool).view(np.uint8)
         maps = [
             rows(depth, np.float32, shape, "depth"),
             rows(normal, np.float32, (*shape, 3), "normal"),
-            None if judged is None else rows(judged, np.uint8, shape, "validated"),
+            None if flags is None else rows(flags, np.uint8, shape, "validated"),
             None if cost is None else rows(cost, np.float32, shape, "cost"),
         ]
         flat = [part for given in maps for part in ((ffi.NULL, 0) if given is None else given[:2])]
-        return stepper._take(lambda out: lib.skep_estimate_from_maps(stepper._handle, step, view, *flat, out))
+        return stepper._take(
+            lambda out: lib.skep_estimate_from_maps(stepper._handle, cycle, view, *flat, out)
+        )
 
     def save(self) -> bytes:
         """The estimate as bytes, to keep it or to send it to another machine."""
@@ -115,13 +122,13 @@ class Estimate:
         return bytes(ffi.buffer(buffer))
 
     @property
-    def info(self) -> StateInfo:
-        """What the estimate is."""
+    def info(self) -> EstimateInfo:
+        """Identity and numbers of the estimate."""
         found = ffi.new("skep_estimate_info *")
         check(lib.skep_estimate_get_info(self._handle, found))
-        return StateInfo(
+        return EstimateInfo(
             found.view,
-            found.step,
+            found.cycle,
             bool(found.is_checked),
             found.pixels,
             found.changed,
@@ -129,18 +136,18 @@ class Estimate:
             found.ncc_evaluations,
         )
 
-    def maps(self) -> StateMaps:
+    def maps(self) -> EstimateMaps:
         """Copies of all maps."""
         shape = self.size[::-1]
         depth, cost = np.empty(shape, dtype=np.float32), np.empty(shape, dtype=np.float32)
         normal, validated = np.empty((*shape, 3), dtype=np.float32), np.empty(shape, dtype=np.uint8)
         arrays = (pointer(array) for array in (depth, normal, cost, validated))
         check(lib.skep_estimate_get_maps(self._handle, *arrays, depth.size))
-        return StateMaps(depth, normal, cost, validated.view(np.bool_))
+        return EstimateMaps(depth, normal, cost, validated.view(np.bool_))
 
 
 class Candidates:
-    """Planes that other views offer to the pixels of a view. Never changes."""
+    """Planes of other views, transferred to the pixels of a view. Never changes."""
 
     __slots__ = ("_handle",)
 
@@ -149,109 +156,126 @@ class Candidates:
 
 
 class Stepper:
-    """A run taken apart; `len(stepper)` is the number of stepper at most.
+    """The stages of a run on single views; `len(stepper)` is the largest number of cycles.
 
-    For step 0, and then for what `next` says until that is None:
-    - when the step is on a finer scale than the estimates, `upsample` each of them;
-    - `propagate`, then `search` each view, all from the estimates the step before left;
-    - `check` each view against what all have just found: that is what the next step starts from.
+    For cycle 0, and then for the cycle that `next` returns until that is None:
+    - if the cycle is on a finer scale than the estimates, `upsample` each of them;
+    - `propagate` and `search` each view, from the checked estimates of the previous cycle;
+    - `check` each view against the searched estimates of the same cycle.
 
-    After the last, `finish` each view, and `fuse` the validated maps. That gives the same bits as `reconstruct`. Stepper
-    of different views may be taken at the same time from several threads. States are passed as a list with one entry
-    for each view of the scene, None for a view of which nothing is known; an empty list knows of none.
+    After the last cycle, `finish` each view and `fuse` the validated maps. That gives the same bits as
+    `reconstruct`. Different views may be processed at the same time from several threads. Lists of estimates
+    have one entry for each view of the scene, None where there is no estimate; an empty list has none.
     """
 
-    __slots__ = ("_handle", "view_count", "_stepper")
+    __slots__ = ("_handle", "view_count", "_cycles")
 
     def __init__(self, scene: Scene, options: Options | None = None) -> None:
         out = ffi.new("skep_stepper **")
         check(lib.skep_stepper_create(scene._handle, _options.handle(options), out))
         self._handle = ffi.gc(out[0], lib.skep_stepper_destroy)
-        stepper, views = ffi.new("uint32_t *"), ffi.new("uint32_t *")
-        check(lib.skep_stepper_get_count(self._handle, stepper, views))
+        cycles, views = ffi.new("uint32_t *"), ffi.new("uint32_t *")
+        check(lib.skep_stepper_get_count(self._handle, cycles, views))
         self.view_count: int = views[0]
-        self._stepper = tuple(self._step(step) for step in range(stepper[0]))
+        self._cycles = tuple(self._cycle(cycle) for cycle in range(cycles[0]))
 
-    def _step(self, step: int) -> Cycle:
+    def _cycle(self, cycle: int) -> Cycle:
         found = ffi.new("skep_cycle *")
-        check(lib.skep_stepper_get_cycle(self._handle, step, found))
-        return Cycle(found.downscale, found.cycle, found.foods, found.iterations)
+        check(lib.skep_stepper_get_cycle(self._handle, cycle, found))
+        return Cycle(found.downscale, found.cycle_on_scale, found.food_sources, found.iterations)
 
     def _take(self, call: Callable[[Any], int]) -> Estimate:
         out = ffi.new("skep_estimate **")
         check(call(out))
-        return self._state(ffi.gc(out[0], lib.skep_estimate_destroy))
+        return self._wrap(ffi.gc(out[0], lib.skep_estimate_destroy))
 
-    def _state(self, handle: Any) -> Estimate:
+    def _wrap(self, handle: Any) -> Estimate:
         info = ffi.new("skep_estimate_info *")
         check(lib.skep_estimate_get_info(handle, info))
-        return Estimate(handle, self.size(info.step, info.view))
+        return Estimate(handle, self.size(info.cycle, info.view))
 
     def __len__(self) -> int:
-        return len(self._stepper)
+        return len(self._cycles)
 
-    def __getitem__(self, step: int) -> Cycle:
-        return self._stepper[step]
+    def __getitem__(self, cycle: int) -> Cycle:
+        return self._cycles[cycle]
 
-    def size(self, step: int, view: int) -> tuple[int, int]:
-        """Width and height of a view's maps at a step."""
+    def size(self, cycle: int, view: int) -> tuple[int, int]:
+        """Width and height of a view's maps in a cycle."""
         width, height = ffi.new("uint32_t *"), ffi.new("uint32_t *")
-        numbers = index(step, "step"), index(view, "view")
+        numbers = index(cycle, "cycle"), index(view, "view")
         check(lib.skep_stepper_get_size(self._handle, *numbers, width, height))
         return width[0], height[0]
 
     def sources(self, view: int) -> tuple[int, ...]:
-        """The source views of a view: those whose estimates its stepper look at."""
+        """The source views of a view."""
         index(view, "view")
         return take_indices(lambda *out: lib.skep_stepper_get_sources(self._handle, view, *out))
 
-    def propagate(self, step: int, view: int, estimates: Sequence[Estimate | None]) -> Candidates:
-        """The planes that other views offer to a view where it has no validated one; from checked estimates."""
+    def propagate(self, cycle: int, view: int, estimates: Sequence[Estimate | None]) -> Candidates:
+        """Transfers consistent planes of the views whose source lists contain the view to its pixels without
+        a validated plane; from the checked estimates of the previous cycle."""
         out = ffi.new("skep_candidates **")
-        numbers = index(step, "step"), index(view, "view")
+        numbers = index(cycle, "cycle"), index(view, "view")
         check(lib.skep_stepper_propagate(self._handle, *numbers, *_array(estimates), out))
         return Candidates(ffi.gc(out[0], lib.skep_candidates_destroy))
 
     def search(
         self,
-        step: int,
+        cycle: int,
         view: int,
         estimates: Sequence[Estimate | None] = (),
         candidates: Candidates | None = None,
         progress: ProgressFunction | None = None,
     ) -> Estimate:
-        """Searches a view for one cycle, from checked estimates on the step's scale; gives one still to be checked.
+        """Searches the planes of a view for one cycle and fills textureless regions; the result is to be
+        checked.
 
-        `progress` as in `reconstruct`.
+        From checked estimates of the previous cycle, on the scale of this one: reads the view's own and the
+        validated surfaces of its sources. `progress` as in `reconstruct`.
         """
         known = tuple(estimates)
-        offered = ffi.NULL if candidates is None else candidates._handle
-        numbers = index(step, "step"), index(view, "view")
+        planes = ffi.NULL if candidates is None else candidates._handle
+        numbers = index(cycle, "cycle"), index(view, "view")
         search = lib.skep_stepper_search
-        call = lambda *hook: search(self._handle, *numbers, *_array(known), offered, *hook)
-        return self._state(run(call, "skep_estimate", progress))
+        call = lambda *hook: search(self._handle, *numbers, *_array(known), planes, *hook)
+        return self._wrap(run(call, "skep_estimate", progress))
 
-    def check(self, step: int, view: int, estimates: Sequence[Estimate | None]) -> Estimate:
-        """Checks a view's solutions against what its sources have just found; from estimates that `search` gave."""
-        numbers = index(step, "step"), index(view, "view")
+    def check(self, cycle: int, view: int, estimates: Sequence[Estimate | None]) -> Estimate:
+        """Checks a view against the searched estimates of its sources, of the same cycle.
+
+        Changes depths and normals too: after the consistency check it corrects foreground fattening (where
+        the scale may end with this cycle), smooths planes, and publishes the validated surface.
+        """
+        numbers = index(cycle, "cycle"), index(view, "view")
         return self._take(lambda out: lib.skep_stepper_check(self._handle, *numbers, *_array(estimates), out))
 
-    def upsample(self, step: int, view: int, estimate: Estimate) -> Estimate:
-        """A checked estimate on the next finer scale, that of `step`."""
-        numbers = index(step, "step"), index(view, "view")
-        return self._take(lambda out: lib.skep_stepper_upsample(self._handle, *numbers, estimate._handle, out))
+    def upsample(self, cycle: int, view: int, estimate: Estimate) -> Estimate:
+        """A checked estimate on the next finer scale, that of `cycle`: each pixel gets the plane of its
+        coarse pixel.
+        """
+        numbers = index(cycle, "cycle"), index(view, "view")
+        return self._take(
+            lambda out: lib.skep_stepper_upsample(self._handle, *numbers, estimate._handle, out)
+        )
 
-    def next(self, step: int, estimates: Sequence[Estimate | None]) -> int | None:
-        """The step to take after `step` was taken for all views, from its checked estimates; None after the last."""
+    def next(self, cycle: int, estimates: Sequence[Estimate | None]) -> int | None:
+        """The cycle after `cycle`, from its checked estimates; None after the last.
+
+        A scale ends early when few pixels changed (option "schedule.min_changed_fraction").
+        """
         following = ffi.new("uint32_t *")
-        check(lib.skep_stepper_next(self._handle, index(step, "step"), *_array(estimates), following))
+        check(lib.skep_stepper_next(self._handle, index(cycle, "cycle"), *_array(estimates), following))
         return None if following[0] == lib.SKEP_CYCLE_NONE else following[0]
 
     def finish(
         self, view: int, estimates: Sequence[Estimate | None], progress: ProgressFunction | None = None
     ) -> ResultView:
-        """Averages planes with those of the source views, closes small gaps, and settles source views, cost and status
-        of every pixel after the last step; from checked estimates."""
+        """Averages planes across views, fills small gaps, and determines view set, cost and status of every
+        pixel.
+
+        From the checked estimates of the last cycle.
+        """
         known = tuple(estimates)
         number = index(view, "view")
         finish = lib.skep_stepper_finish
@@ -260,6 +284,6 @@ class Stepper:
 
 
 def _array(estimates: Sequence[Estimate | None]) -> tuple[Any, int]:
-    """States as C takes them; the caller keeps them alive."""
+    """Estimates as C takes them; the caller keeps them alive."""
     handles = [ffi.NULL if estimate is None else estimate._handle for estimate in estimates]
     return ffi.new("skep_estimate *[]", handles), len(handles)
