@@ -248,7 +248,7 @@ impl Stepper {
     ) -> Result<()> {
         if found.view() != view {
             let (value, expected) =
-                (format!("that of view {}", found.view()), format!("that of view {view}"));
+                (format!("the estimate of view {}", found.view()), format!("that of view {view}"));
             return Err(Error::argument(name, value, expected));
         }
         self.check_size(cycle, found, name)

@@ -161,11 +161,11 @@ mod tests {
         map.planes[none + 1].validated = true;
         let upsampled = map.upsample(&coarse, &fine, RANGE);
         let surface = upsampled.publish(&fine);
-        for pixel in 0..24 {
+        for (pixel, (plane, published)) in upsampled.planes.iter().zip(&surface).enumerate() {
             let parent = pixel / 6 / 2 * 3 + pixel % 6 / 2;
-            assert_eq!(upsampled.planes[pixel].depth == 0.0, parent == none);
-            assert_eq!(upsampled.planes[pixel].validated, parent == none + 1);
-            assert_eq!(surface[pixel].inverse_depth() > 0.0, parent == none + 1);
+            assert_eq!(plane.depth == 0.0, parent == none);
+            assert_eq!(plane.validated, parent == none + 1);
+            assert_eq!(published.inverse_depth() > 0.0, parent == none + 1);
         }
     }
 
