@@ -8,7 +8,7 @@ use super::result::skep_result;
 use super::scene::{no_view, skep_scene};
 use super::status::{Failure, guard, skep_status};
 use crate::parallel::JoinedPool;
-use crate::pipeline::{AnyEstimate, Candidates, Checked, EstimateRef, Stepper, ViewEstimate};
+use crate::pipeline::{AnyEstimate, Candidates, Checked, EstimateRef, Place, Stepper, ViewEstimate};
 use std::ffi::c_void;
 
 /// The stages of a run on single views, for hosts that schedule views themselves. Immutable.
@@ -424,18 +424,19 @@ pub unsafe extern "C" fn skep_stepper_check(
         };
         // SAFETY: as the header demands of the caller, who keeps the estimates during the call.
         let estimates = unsafe { skep_stepper::estimates(estimates) }?;
-        stepper.stepper.size(cycle as usize, view as usize)?;
-        let name = format!("estimates[{view}]");
-        let own = estimates.get(view as usize).copied().flatten();
-        let own = own.ok_or_else(|| Failure::argument(&name, "NULL", "the estimate of the view itself"))?;
-        let expected = "one that is searched and not checked";
-        let own = own.searched().ok_or_else(|| Failure::argument(&name, "checked", expected))?;
-        if (own.view(), own.cycle()) != (view as usize, cycle as usize) {
-            let value = format!("the estimate of view {} in cycle {}", own.view(), own.cycle());
-            return Err(Failure::argument(&name, value, format!("that of view {view} in cycle {cycle}")));
-        }
         let sources: Vec<Option<EstimateRef>> =
             estimates.iter().map(|estimate| estimate.map(EstimateRef::from)).collect();
+        let at = Place { cycle: cycle as usize, view: view as usize };
+        stepper.stepper.check_sources(at, &sources)?;
+        let name = format!("estimates[{view}]");
+        let own = estimates.get(at.view).copied().flatten();
+        let own = own.ok_or_else(|| Failure::argument(&name, "none", "the estimate of the view itself"))?;
+        let expected = "one that is searched and not yet checked";
+        let own = own.searched().ok_or_else(|| Failure::argument(&name, "checked", expected))?;
+        if own.cycle() != at.cycle {
+            let value = format!("searched in cycle {}", own.cycle());
+            return Err(Failure::argument(&name, value, format!("one that is searched in cycle {cycle}")));
+        }
         let checked = stepper.install(|| stepper.stepper.check(own, &sources))?;
         out.give(skep_estimate::new(AnyEstimate::Checked(checked)));
         Ok(())
@@ -469,6 +470,7 @@ pub unsafe extern "C" fn skep_stepper_upsample(
             (get(stepper, "stepper")?, get(estimate, "estimate")?, out(estimate_out, "estimate_out")?)
         };
         let estimate = require_checked(estimate.inner(), "estimate")?;
+        stepper.stepper.size(cycle as usize, view as usize)?;
         if estimate.view() != view as usize {
             let (value, expected) =
                 (format!("the estimate of view {}", estimate.view()), format!("that of view {view}"));

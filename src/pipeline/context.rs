@@ -43,17 +43,21 @@ impl RunContext {
     pub fn new(scene: &Scene, options: &Options, advance: Advance) -> Result<RunContext> {
         options.check()?;
         let scales = &options.schedule.scales;
-        let scaled = |scale: &crate::Scale| {
-            let scaled = |view| advance(0).map(|()| ScaledView::of(scene, view, scale.downscale));
-            (0..scene.views().len()).into_par_iter().map(scaled).collect()
-        };
+        let mut scaled = Vec::new();
+        for scale in scales {
+            let views = (0..scene.views().len()).into_par_iter().map(|view| {
+                advance(0)?;
+                Ok(ScaledView::of(scene, view, scale.downscale))
+            });
+            scaled.push(views.collect::<Result<Vec<_>>>()?);
+        }
         Ok(RunContext {
             options: options.clone(),
             level: options.simd.unwrap_or_else(SimdLevel::detect),
             windows: (0..scales.len()).map(|scale| window(options, scale)).collect(),
             sources: source_lists(scene, options),
             cycles: Cycle::all(options),
-            scaled: scales.iter().map(scaled).collect::<Result<_>>()?,
+            scaled,
         })
     }
 

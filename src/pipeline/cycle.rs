@@ -16,11 +16,11 @@ pub struct Cycle {
 impl Cycle {
     /// All cycles of a run in order.
     pub(super) fn all(options: &Options) -> Vec<Cycle> {
-        let scales = options.schedule.scales.iter().enumerate();
-        let cycles = |(scale_index, &scale): (usize, &Scale)| {
-            (0..=scale.cycles).map(move |cycle| Cycle { scale_index, scale, cycle })
-        };
-        scales.flat_map(cycles).collect()
+        let mut cycles = Vec::new();
+        for (scale_index, &scale) in options.schedule.scales.iter().enumerate() {
+            cycles.extend((0..=scale.cycles).map(|cycle| Cycle { scale_index, scale, cycle }));
+        }
+        cycles
     }
 
     /// Iterations of employed, onlooker and scout bees.

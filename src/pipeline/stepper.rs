@@ -155,17 +155,8 @@ impl Stepper {
         own: &ViewEstimate<Searched>,
         sources: &[Option<EstimateRef>],
     ) -> Result<ViewEstimate<Checked>> {
-        self.0.check_place(own.at)?;
         self.check_size(own.cycle(), own, "own")?;
-        self.check_count(sources.len())?;
-        for (view, source) in sources.iter().enumerate() {
-            let name = format!("estimates[{view}]");
-            match source {
-                Some(EstimateRef::Searched(found)) => self.check_estimate(own.cycle(), view, found, &name)?,
-                Some(EstimateRef::Checked(found)) => self.check_estimate(own.cycle(), view, found, &name)?,
-                None => (),
-            }
-        }
+        self.check_sources(own.at, sources)?;
         let planes = |view: usize| sources.get(view).copied().flatten().map(EstimateRef::planes);
         let planes = SourcePlanes::new(self.sources(own.view()), planes);
         let verdicts = stages::check(&self.0, own, planes, &|_| Ok(()))?;
@@ -218,6 +209,21 @@ impl Stepper {
         let surface =
             |source: usize| estimates.get(source).copied().flatten().map_or(&[][..], ViewEstimate::surface);
         PublishedSurfaces::new(self.sources(view), surface)
+    }
+
+    /// Refuses sources of a check that are of other views or scales than their places say.
+    pub(crate) fn check_sources(&self, at: Place, sources: &[Option<EstimateRef>]) -> Result<()> {
+        self.0.check_place(at)?;
+        self.check_count(sources.len())?;
+        for (view, source) in sources.iter().enumerate() {
+            let name = format!("estimates[{view}]");
+            match source {
+                Some(EstimateRef::Searched(found)) => self.check_estimate(at.cycle, view, found, &name)?,
+                Some(EstimateRef::Checked(found)) => self.check_estimate(at.cycle, view, found, &name)?,
+                None => (),
+            }
+        }
+        Ok(())
     }
 
     /// Refuses estimates of other views or scales than their places say.
