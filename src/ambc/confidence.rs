@@ -87,7 +87,7 @@ impl Task for Run<'_> {
             simd,
             all,
             task.advance,
-            0,
+            |_| 0,
             #[inline(always)]
             |band: Band| {
                 let mut evaluator = Evaluator::new(simd, problem, window, task.cost);

@@ -84,9 +84,9 @@ impl Search<'_> {
         self.mask.is_none_or(|mask| mask[index])
     }
 
-    /// Units of work of a band: it has half of its pixels in either color.
-    fn units(&self, bands: Bands) -> u64 {
-        (bands.pixels() * self.rules.food_sources) as u64 / 2
+    /// Units of work of a band of so many rows: it has half of its pixels in either color.
+    fn units(&self, rows: usize) -> u64 {
+        (rows * self.grid().width * self.rules.food_sources) as u64 / 2
     }
 }
 
@@ -177,7 +177,7 @@ fn fill_colonies<S: Simd>(simd: S, search: &Search, state: &mut State) -> Result
         simd,
         bands_of_state,
         search.advance,
-        search.units(bands),
+        |band| search.units(band.is_textureless.len() / grid.width),
         #[inline(always)]
         |band: InitialBand| {
             let InitialBand { top, foods: [first, second], visible, matched, is_textureless } = band;
@@ -244,7 +244,7 @@ fn improve_colonies<S: Simd>(
         simd,
         searched,
         search.advance,
-        search.units(bands),
+        |band| search.units(band.foods.len() / row_foods),
         #[inline(always)]
         |band: SearchedBand| {
             let mut evaluator = Evaluator::new(simd, search.problem, search.window, rules.cost);

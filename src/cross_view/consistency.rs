@@ -138,7 +138,7 @@ impl Task for CheckTask<'_> {
             simd,
             all,
             check.advance,
-            0,
+            |_| 0,
             #[inline(always)]
             |band: Band| {
                 let mut projector = SourceProjector::with_all_sources(simd, check.problem);

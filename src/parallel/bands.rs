@@ -35,7 +35,7 @@ impl Bands {
 }
 
 /// Does `work` for each band on the threads of the current rayon pool, compiled for the instruction set, and returns the
-/// results in order. Before each band `advance` counts `units` units of work.
+/// results in order. Before each band `advance` counts its `units` of work.
 ///
 /// # Errors
 /// What `advance` returns; bands that have not begun are left out then.
@@ -44,11 +44,11 @@ pub fn run_bands<S: Simd, B: Send, R: Send>(
     simd: S,
     bands: Vec<B>,
     advance: Advance,
-    units: u64,
+    units: impl Fn(&B) -> u64 + Sync,
     work: impl Fn(B) -> R + Sync,
 ) -> Result<Vec<R>> {
     let run = |band: B| {
-        advance(units)?;
+        advance(units(&band))?;
         Ok(simd.vectorize(
             #[inline(always)]
             || work(band),

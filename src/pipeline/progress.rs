@@ -92,7 +92,7 @@ mod tests {
         tracker.advance(0, SOMEWHERE).unwrap();
         tracker.jump_to(6);
         tracker.advance(1, SOMEWHERE).unwrap();
-        // Bands are rounded up: more than all work counts as all.
+        // More than all work counts as all.
         tracker.advance(5, SOMEWHERE).unwrap();
         assert_eq!(*told.lock().unwrap(), [0.25, 0.25, 0.875, 1.0]);
     }
