@@ -29,3 +29,4 @@ mod scene;
 mod scene_queries;
 mod status;
 mod stepper;
+mod stepper_stages;

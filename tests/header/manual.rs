@@ -27,7 +27,8 @@ const SECTIONS: [(&str, &str); 14] = [
 ];
 const OBJECTS: &str = "Objects";
 /// Files whose contents continue the section of the file before the underscore.
-const CONTINUED: [(&str, &str); 2] = [("result_maps", "result"), ("scene_queries", "scene")];
+const CONTINUED: [(&str, &str); 3] =
+    [("result_maps", "result"), ("scene_queries", "scene"), ("stepper_stages", "stepper")];
 const WIDTH: usize = 110;
 const END_OF_INCLUDES: &str = "#include <stdint.h>\n";
 const END_OF_ITEMS: &str = "#ifdef __cplusplus\n}";
