@@ -1,8 +1,9 @@
 //! The view set and the confidence of final planes.
 
-use super::cost::{CostRules, Evaluator};
+use super::cost::Evaluator;
 use super::counts::Counts;
 use super::food_source::FoodSource;
+use super::rules::CostRules;
 use crate::error::Result;
 use crate::geometry::{Grid, ViewSets};
 use crate::matching::{MAX_COST, Problem, Window};

@@ -12,66 +12,18 @@ use super::aggregation::{GroupCosts, count_visible, rank_of, sum, sum_of_best};
 use super::colony::Colonies;
 use super::counts::Counts;
 use super::food_source::{FoodSource, cost_to_beat};
-use super::smoothness_term::{SmoothnessRules, SmoothnessTerm};
+use super::rules::{CostRules, GeometricRules};
+use super::smoothness_term::SmoothnessTerm;
 use crate::geometry::{Position, SlantedPlane, ViewSets};
 use crate::matching::{
     Group, MAX_COST, Problem, Projections, ReferencePatch, SourceProjector, Window, patch_costs,
 };
-use crate::options::Options;
 use crate::simd::{LANES, Simd};
 use glam::Vec3;
 
 type Lanes = [f32; LANES];
 
-/// The rules of the cost.
-#[derive(Debug, Clone, Copy)]
-pub struct CostRules {
-    /// Views whose mean is the cost; 0 takes the sum over all (equation 3 of the paper).
-    best_views: usize,
-    /// Hypotheses visible in fewer views cost infinitely much.
-    min_views: usize,
-    /// Ratio of the patch's variance to the image noise under which the patch is textureless.
-    min_texture_to_noise: f32,
-    geometric: GeometricRules,
-    smoothness: SmoothnessRules,
-}
-
-/// The penalty of disagreement with the source views' validated surfaces, quadratic up to a limit: hypotheses that nearly
-/// agree are left to the images, and a wrong neighbor cannot rule out a good match.
-#[derive(Debug, Clone, Copy)]
-struct GeometricRules {
-    /// Cost of a squared relative depth error; 0 turns the term off.
-    weight: f32,
-    /// Relative depth error at the limit.
-    max_error: f32,
-    /// Cost where the source view has no validated depth.
-    missing_cost: f32,
-}
-
 impl CostRules {
-    /// The rules of these options; the geometric term needs published surfaces.
-    pub fn new(options: &Options, with_geometric_term: bool) -> CostRules {
-        let cost = &options.cost;
-        let weight = if with_geometric_term { cost.geom_consistency_weight } else { 0.0 };
-        let max_error = cost.geom_consistency_max_error;
-        let missing_error = cost.geom_consistency_missing_error.min(max_error) / max_error;
-        CostRules {
-            best_views: cost.best_views as usize,
-            min_views: options.min_matched_views(),
-            min_texture_to_noise: options.window.min_texture_to_noise as f32,
-            geometric: GeometricRules {
-                weight: (weight / max_error.powi(2)) as f32,
-                max_error: max_error as f32,
-                missing_cost: (weight * missing_error.powi(2)) as f32,
-            },
-            smoothness: SmoothnessRules {
-                weight: cost.smoothness_weight as f32,
-                max_depth_error: cost.smoothness_max_depth_error as f32,
-                max_normal_error: (1.0 - cost.smoothness_max_normal_error.to_radians().cos()) as f32,
-            },
-        }
-    }
-
     /// The geometric costs of a hypothesis of this depth in the views of a group.
     #[inline(always)]
     fn geometric_costs<S: Simd>(

@@ -3,8 +3,8 @@
 use super::colony::Candidate;
 use super::cost::Evaluator;
 use super::food_source::FoodSource;
+use super::input::Search;
 use super::random::Random;
-use super::search::Search;
 use crate::geometry::Position;
 use crate::matching::MAX_COST;
 use crate::scene::PixelEstimate;

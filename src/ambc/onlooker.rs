@@ -4,6 +4,7 @@ use super::colony::Colonies;
 use super::cost::Evaluator;
 use super::food_source::FoodSource;
 use super::random::Random;
+use super::rules::OnlookerRules;
 use crate::geometry::{Offset, Position};
 use crate::simd::Simd;
 
@@ -34,15 +35,6 @@ pub const OFFSETS: [Offset; 20] = [
 
 /// Relative depth difference up to which two planes of the same normal are the same.
 const SAME_DEPTH: f32 = 1e-6;
-
-/// How onlookers choose.
-#[derive(Debug, Clone, Copy)]
-pub struct OnlookerRules {
-    /// Fitness bonus of validated planes (section 5.6 of the paper).
-    pub reward: f32,
-    /// Random neighbors of which the one of lowest cost is visited; the paper's onlookers visit the first.
-    pub tournament_size: u32,
-}
 
 /// Tries, for every food source, the best plane of a random neighbor of the other color, transferred to this pixel, and
 /// keeps the better of both. A validated plane has a bonus in that comparison (section 5.6 of the paper).

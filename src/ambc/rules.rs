@@ -1,7 +1,5 @@
 //! The numbers a search depends on, in the form in which it uses them.
 
-use super::cost::CostRules;
-use super::onlooker::OnlookerRules;
 use crate::options::{Options, Scale};
 use crate::view_selection::ViewRules;
 
@@ -39,6 +37,53 @@ pub struct Perturbation {
     pub normal: f32,
 }
 
+/// The rules of the cost.
+#[derive(Debug, Clone, Copy)]
+pub struct CostRules {
+    /// Views whose mean is the cost; 0 takes the sum over all (equation 3 of the paper).
+    pub best_views: usize,
+    /// Hypotheses visible in fewer views cost infinitely much.
+    pub min_views: usize,
+    /// Ratio of the patch's variance to the image noise under which the patch is textureless.
+    pub min_texture_to_noise: f32,
+    /// The penalty of disagreement with other views.
+    pub geometric: GeometricRules,
+    /// The penalty of disagreement with neighbors.
+    pub smoothness: SmoothnessRules,
+}
+
+/// The penalty of disagreement with the source views' validated surfaces, quadratic up to a limit: hypotheses that nearly
+/// agree are left to the images, and a wrong neighbor cannot rule out a good match.
+#[derive(Debug, Clone, Copy)]
+pub struct GeometricRules {
+    /// Cost of a squared relative depth error; 0 turns the term off.
+    pub weight: f32,
+    /// Relative depth error at the limit.
+    pub max_error: f32,
+    /// Cost where the source view has no validated depth.
+    pub missing_cost: f32,
+}
+
+/// The penalty of disagreement with neighbors, quadratic up to a limit: planes that nearly agree are left to the images.
+#[derive(Debug, Clone, Copy)]
+pub struct SmoothnessRules {
+    /// Cost at the limit against all four neighbors; 0 turns the term off.
+    pub weight: f32,
+    /// Relative depth error at the limit.
+    pub max_depth_error: f32,
+    /// `1 - cos` of the angle between normals at the limit.
+    pub max_normal_error: f32,
+}
+
+/// How onlookers choose.
+#[derive(Debug, Clone, Copy)]
+pub struct OnlookerRules {
+    /// Fitness bonus of validated planes (section 5.6 of the paper).
+    pub reward: f32,
+    /// Random neighbors of which the one of lowest cost is visited; the paper's onlookers visit the first.
+    pub tournament_size: u32,
+}
+
 impl SearchRules {
     /// The rules of a cycle on a scale; a guided search is one for which some view has a checked estimate.
     pub fn new(options: &Options, scale: &Scale, cycle_on_scale: u32, is_guided: bool) -> SearchRules {
@@ -63,6 +108,31 @@ impl SearchRules {
             perturbation: Perturbation {
                 depth: (search.depth_perturbation * shrink) as f32,
                 normal: (search.normal_perturbation * shrink) as f32,
+            },
+        }
+    }
+}
+
+impl CostRules {
+    /// The rules of these options; the geometric term needs published surfaces.
+    pub fn new(options: &Options, with_geometric_term: bool) -> CostRules {
+        let cost = &options.cost;
+        let weight = if with_geometric_term { cost.geom_consistency_weight } else { 0.0 };
+        let max_error = cost.geom_consistency_max_error;
+        let missing_error = cost.geom_consistency_missing_error.min(max_error) / max_error;
+        CostRules {
+            best_views: cost.best_views as usize,
+            min_views: options.min_matched_views(),
+            min_texture_to_noise: options.window.min_texture_to_noise as f32,
+            geometric: GeometricRules {
+                weight: (weight / max_error.powi(2)) as f32,
+                max_error: max_error as f32,
+                missing_cost: (weight * missing_error.powi(2)) as f32,
+            },
+            smoothness: SmoothnessRules {
+                weight: cost.smoothness_weight as f32,
+                max_depth_error: cost.smoothness_max_depth_error as f32,
+                max_normal_error: (1.0 - cost.smoothness_max_normal_error.to_radians().cos()) as f32,
             },
         }
     }

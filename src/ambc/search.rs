@@ -1,46 +1,23 @@
 //! The search of one reference view in one cycle: bands of rows on the threads, tiles within a band, and the two colors of
 //! the checkerboard in turn.
 
-use super::colony::{Candidate, Colonies, color};
+use super::colony::{Colonies, color};
 use super::cost::Evaluator;
 use super::counts::Counts;
 use super::food_source::FoodSource;
 use super::initial_colony::{InitialColony, PixelSets};
+use super::input::Search;
 use super::random::{Random, stream};
-use super::rules::SearchRules;
 use super::{employed, local_plane, onlooker, scout};
 use crate::error::Result;
 use crate::geometry::{Grid, Position, ViewSets};
-use crate::matching::{Problem, Window};
-use crate::parallel::{Advance, Bands, run_bands};
+use crate::parallel::{Bands, run_bands};
 use crate::scene::PixelEstimate;
-use crate::simd::{Simd, SimdLevel, Task, dispatch};
+use crate::simd::{Simd, Task, dispatch};
 use rayon::prelude::*;
 
 /// Columns of a tile: its colonies and the parts of the sources that they reach stay in cache.
 const TILE_COLUMNS: usize = 64;
-
-/// The input of a search.
-pub struct Search<'a> {
-    /// The view and its sources, with their published surfaces.
-    pub problem: &'a Problem<'a>,
-    /// Shape and weights of the patches.
-    pub window: &'a Window,
-    /// The numbers it depends on.
-    pub rules: SearchRules,
-    /// The pixels that are searched; `None` for all.
-    pub mask: Option<&'a [bool]>,
-    /// The previous estimate of each pixel; `None` in the very first cycle.
-    pub start: Option<&'a [PixelEstimate]>,
-    /// The planes that other views propagate, one for each pixel.
-    pub candidates: Option<&'a [Candidate]>,
-    /// Names the random numbers of this view and cycle.
-    pub random_stream: u64,
-    /// Instruction set.
-    pub level: SimdLevel,
-    /// Told of the food sources of each band of colonies that is filled or searched.
-    pub advance: Advance<'a>,
-}
 
 /// The result of a search.
 pub struct SearchResult {

@@ -8,20 +8,10 @@
 
 use super::colony::Colonies;
 use super::food_source::FoodSource;
+use super::rules::SmoothnessRules;
 use crate::geometry::{Offset, Position};
 use crate::matching::{Problem, Window};
 use glam::Vec3;
-
-/// The penalty of disagreement with neighbors, quadratic up to a limit: planes that nearly agree are left to the images.
-#[derive(Debug, Clone, Copy)]
-pub struct SmoothnessRules {
-    /// Cost at the limit against all four neighbors; 0 turns the term off.
-    pub weight: f32,
-    /// Relative depth error at the limit.
-    pub max_depth_error: f32,
-    /// `1 - cos` of the angle between normals at the limit.
-    pub max_normal_error: f32,
-}
 
 /// The planes that the neighbors predict for the current pixel.
 #[derive(Debug, Clone)]

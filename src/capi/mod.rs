@@ -30,3 +30,4 @@ mod scene_queries;
 mod status;
 mod stepper;
 mod stepper_stages;
+mod text;

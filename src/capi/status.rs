@@ -1,6 +1,6 @@
 //! Status codes, the text of the last error, versions.
 
-use super::pointers::copy_text;
+use super::text::copy_text;
 use crate::error::Error;
 use crate::simd::SimdLevel;
 use std::cell::RefCell;

@@ -3,8 +3,8 @@
 use super::*;
 use crate::ambc::colony::{Colonies, color};
 use crate::ambc::food_source::cost_to_beat;
-use crate::ambc::onlooker::OnlookerRules;
 use crate::ambc::random::Random;
+use crate::ambc::rules::OnlookerRules;
 use crate::ambc::{employed, onlooker, scout};
 use crate::geometry::Grid;
 use crate::geometry::MIN_FACING;
