@@ -1,8 +1,7 @@
 //! What all stages of a run share, and nothing changes: options, images of all scales, source lists, the order of the cycles.
 
-use super::cycle::Cycle;
-use super::estimate::{Checked, ViewEstimate};
-use super::store::PublishedSurfaces;
+use super::cycle::{Cycle, CycleRecord, Place};
+use super::sources::PublishedSurfaces;
 use crate::cross_view::Donor;
 use crate::error::{Error, Result};
 use crate::matching::{Problem, Source, Window};
@@ -13,15 +12,6 @@ use crate::scene::{PixelEstimate, ScaledView, Scene};
 use crate::simd::SimdLevel;
 use crate::view_selection::{SourceLists, source_lists};
 use rayon::prelude::*;
-
-/// A view in a cycle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Place {
-    /// Index of the cycle in the run.
-    pub cycle: usize,
-    /// Index of the view in the scene.
-    pub view: usize,
-}
 
 /// What all stages of a run share.
 pub struct RunContext {
@@ -122,15 +112,15 @@ impl RunContext {
         (0..self.views()).filter(has_view).filter_map(donor).collect()
     }
 
-    /// The cycle after this one; `None` after the last. A scale ends early once fewer pixels of the estimates changed in the
-    /// cycle than the option `schedule.min_changed_fraction` asks for.
+    /// The cycle after this one, whose records these are; `None` after the last. A scale ends early once fewer pixels changed
+    /// than the option `schedule.min_changed_fraction` asks for.
     pub fn next_cycle<'e>(
         &self,
         cycle: usize,
-        estimates: impl Iterator<Item = &'e ViewEstimate<Checked>>,
+        records: impl Iterator<Item = &'e CycleRecord>,
     ) -> Option<usize> {
         let (mut changed, mut pixels) = (0, 0);
-        for record in estimates.filter_map(|estimate| estimate.cycles().last()) {
+        for record in records {
             changed += record.changed;
             pixels += record.pixels;
         }
@@ -143,16 +133,12 @@ impl RunContext {
         (cycle + 1..self.cycles.len()).find(is_next)
     }
 
-    /// Whether the scale may end with the cycle of an estimate, as far as the estimate alone determines it.
-    pub fn may_end_scale<S>(&self, estimate: &ViewEstimate<S>) -> bool {
+    /// Whether the scale may end with a cycle, as far as the record of one view determines it.
+    pub fn may_end_scale(&self, cycle: usize, record: Option<&CycleRecord>) -> bool {
         let scale = |cycle: usize| self.cycles.get(cycle).map(|cycle| cycle.scale_index);
         let min_changed = self.options.schedule.min_changed_fraction;
-        let cycle = estimate.cycle();
         scale(cycle + 1) != scale(cycle)
-            || estimate
-                .cycles()
-                .last()
-                .is_some_and(|record| (record.changed as f64) < min_changed * record.pixels as f64)
+            || record.is_some_and(|record| (record.changed as f64) < min_changed * record.pixels as f64)
     }
 
     /// Units of work of searching all views in the cycles before this one.

@@ -35,3 +35,27 @@ impl Cycle {
         pixels * passes * u64::from(self.scale.food_sources) / 2
     }
 }
+
+/// A view in a cycle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Place {
+    /// Index of the cycle in the run.
+    pub cycle: usize,
+    /// Index of the view in the scene.
+    pub view: usize,
+}
+
+/// What one cycle did to one view.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CycleRecord {
+    /// Size of the images: 1 is full, 2 half, 4 a quarter.
+    pub downscale: u32,
+    /// The cycle on that scale, counted from 0.
+    pub cycle: u32,
+    /// Pixels with a plane after the search.
+    pub pixels: u64,
+    /// Pixels whose depth changed by more than a thousandth.
+    pub changed: u64,
+    /// Pixels validated by the check after it.
+    pub validated: u64,
+}

@@ -1,8 +1,7 @@
 //! The estimate of one view between two stages. Its type says which stage it has passed.
 
-use super::context::{Place, RunContext};
-use super::result::CycleRecord;
-use super::stepper::Stepper;
+use super::context::RunContext;
+use super::cycle::{CycleRecord, Place};
 use crate::ambc::Counts;
 use crate::error::{Error, Result};
 use crate::geometry::ViewSets;
@@ -127,14 +126,7 @@ impl ViewEstimate<Searched> {
 }
 
 impl ViewEstimate<Checked> {
-    /// The estimate of a view whose maps the host brings, as if it had been checked in this cycle.
-    ///
-    /// # Errors
-    /// A cycle or view that does not exist; maps of another size than the view has in the cycle; a depth that is negative
-    /// or not finite; a normal that is not unit or turned away from the camera where there is a depth; a cost that is
-    /// negative or not a number.
-    pub fn from_maps(stepper: &Stepper, cycle: usize, view: usize, own: &OwnMaps) -> Result<Self> {
-        let (context, at) = (stepper.context(), Place { cycle, view });
+    pub(super) fn of_maps(context: &RunContext, at: Place, own: &OwnMaps) -> Result<Self> {
         context.check_place(at)?;
         let map = plane_map(context, at, own)?;
         let surface = map.publish(&context.scaled(at).camera);

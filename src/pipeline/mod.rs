@@ -10,6 +10,7 @@ mod estimate;
 mod progress;
 mod result;
 mod serialize;
+mod sources;
 mod stages;
 mod status;
 mod stepper;
@@ -19,12 +20,12 @@ use crate::error::Result;
 use crate::options::Options;
 use crate::parallel::{JoinedPool, Phase, ProgressFn};
 use crate::scene::Scene;
-pub(crate) use context::Place;
 use context::RunContext;
-pub use cycle::Cycle;
+pub(crate) use cycle::Place;
+pub use cycle::{Cycle, CycleRecord};
 pub use estimate::{AnyEstimate, Checked, EstimateRef, OwnMaps, Searched, ViewEstimate};
 use progress::Tracker;
-pub use result::{CycleRecord, Reconstruction, ViewResult};
+pub use result::{Reconstruction, ViewResult};
 pub use stages::Candidates;
 use stages::SearchInput;
 pub use stepper::Stepper;
@@ -51,7 +52,7 @@ fn run(scene: &Scene, options: &Options, report: ProgressFn) -> Result<Reconstru
     let mut next = Some(0);
     while let Some(cycle) = next {
         estimates = run_cycle(&context, cycle, estimates, &tracker)?;
-        next = context.next_cycle(cycle, estimates.known());
+        next = context.next_cycle(cycle, estimates.last_records());
         tracker.jump_to(context.work_before(next.unwrap_or(context.cycles().len())));
     }
     let views = finish(&context, estimates, &tracker)?;

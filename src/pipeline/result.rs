@@ -1,24 +1,10 @@
 //! The result of a run.
 
+use super::cycle::CycleRecord;
 use crate::ambc::Counts;
 use crate::fusion::PointCloud;
 use crate::geometry::ViewSets;
 use crate::scene::{Maps, PixelStatus};
-
-/// One cycle's search of one view.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct CycleRecord {
-    /// Size of the images: 1 is full, 2 half, 4 a quarter.
-    pub downscale: u32,
-    /// The cycle on that scale, counted from 0.
-    pub cycle: u32,
-    /// Pixels searched.
-    pub pixels: u64,
-    /// Pixels whose depth changed by more than a thousandth.
-    pub changed: u64,
-    /// Pixels validated by the check after it.
-    pub validated: u64,
-}
 
 /// The result of one view.
 #[derive(Debug, Clone)]

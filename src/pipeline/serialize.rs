@@ -10,9 +10,8 @@
 //!
 //! All numbers are little-endian. The published surface of a checked estimate is made from its planes.
 
-use super::context::Place;
+use super::cycle::{CycleRecord, Place};
 use super::estimate::{AnyEstimate, Checked, Searched, ViewEstimate, is_unit};
-use super::result::CycleRecord;
 use super::stepper::Stepper;
 use crate::ambc::Counts;
 use crate::error::{Error, Result};

@@ -1,12 +1,13 @@
 //! The stages of a run, one function each: what it reads are its arguments, what it changes is what it returns or takes by
 //! `&mut`. The order is in [`pipeline`](super).
 
-use super::context::{Place, RunContext};
+use super::context::RunContext;
+use super::cycle::{CycleRecord, Place};
 use super::estimate::{Checked, Searched, Unfilled, Unpublished, ViewEstimate, maps_of};
 use super::progress::Tracker;
-use super::result::{CycleRecord, ViewResult};
+use super::result::ViewResult;
+use super::sources::{PublishedSurfaces, SourcePlanes};
 use super::status;
-use super::store::{PublishedSurfaces, SourcePlanes};
 use crate::ambc::{Candidate, ConfidenceTask, CostRules, Counts, Search, SearchResult, SearchRules, stream};
 use crate::cross_view::{self, ConsistencyCheck, ConsistencyRules, Donor, Target};
 use crate::error::Result;
@@ -219,7 +220,7 @@ pub fn apply_check(own: ViewEstimate<Searched>, verdicts: &[Verdict]) -> ViewEst
 /// Corrects foreground fattening where a scale may end: changes depths, normals and, in the last cycle, verdicts of validated
 /// pixels at edges.
 pub fn correct_fattening(context: &RunContext, own: &mut ViewEstimate<Unpublished>) {
-    if context.may_end_scale(own) {
+    if context.may_end_scale(own.cycle(), own.cycles().last()) {
         let filter = CorrectFattening {
             passes: context.options.refine.fattening_passes,
             is_last_cycle: own.cycle() + 1 == context.cycles().len(),

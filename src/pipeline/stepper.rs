@@ -1,12 +1,12 @@
 //! A run taken apart: the public stepwise interface. Checks what the host passes and calls the stages.
 
-use super::context::{Place, RunContext};
-use super::cycle::Cycle;
-use super::estimate::{Checked, EstimateRef, Searched, ViewEstimate};
+use super::context::RunContext;
+use super::cycle::{Cycle, Place};
+use super::estimate::{Checked, EstimateRef, OwnMaps, Searched, ViewEstimate};
 use super::progress::Tracker;
 use super::result::ViewResult;
+use super::sources::{PublishedSurfaces, SourcePlanes};
 use super::stages::{self, Candidates, SearchInput};
-use super::store::{PublishedSurfaces, SourcePlanes};
 use crate::error::{Error, Result};
 use crate::options::Options;
 use crate::parallel::{Phase, ProgressFn};
@@ -173,7 +173,9 @@ impl Stepper {
     /// A cycle that does not exist; estimates of another scale.
     pub fn next(&self, cycle: usize, estimates: Known<Checked>) -> Result<Option<usize>> {
         self.check_estimates(Place { cycle, view: 0 }, estimates)?;
-        Ok(self.0.next_cycle(cycle, estimates.iter().copied().flatten()))
+        Ok(self
+            .0
+            .next_cycle(cycle, estimates.iter().copied().flatten().filter_map(|own| own.cycles().last())))
     }
 
     /// The result of a view after the last cycle: averages validated planes across views, fills small gaps where the sources
@@ -274,5 +276,17 @@ impl Stepper {
              next coarser scale are upsampled first"
         );
         Err(Error::argument(name, value, expected))
+    }
+}
+
+impl ViewEstimate<Checked> {
+    /// The estimate of a view whose maps the host brings, as if it had been checked in this cycle.
+    ///
+    /// # Errors
+    /// A cycle or view that does not exist; maps of another size than the view has in the cycle; a depth that is negative
+    /// or not finite; a normal that is not unit or turned away from the camera where there is a depth; a cost that is
+    /// negative or not a number.
+    pub fn from_maps(stepper: &Stepper, cycle: usize, view: usize, own: &OwnMaps) -> Result<Self> {
+        ViewEstimate::of_maps(&stepper.0, Place { cycle, view }, own)
     }
 }

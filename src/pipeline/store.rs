@@ -1,60 +1,20 @@
-//! What a run keeps of each view between stages, today in memory. Stages take planes and surfaces of other views from here
-//! in named types, by the source list of the view they work on.
+//! What a run keeps of each view between stages, today in memory.
 
+use super::cycle::CycleRecord;
 use super::estimate::{Checked, ViewEstimate};
+use super::sources::{PublishedSurfaces, SourcePlanes};
 use crate::error::Result;
 use crate::scene::{CompactPlane, PixelEstimate};
 use rayon::prelude::*;
-use std::marker::PhantomData;
 
 /// One value for each view.
 pub struct Store<T>(Vec<T>);
-
-/// The surfaces that the sources of a view published after a check, in the order of its source list; empty where nothing is
-/// known.
-pub struct PublishedSurfaces<'a>(pub Vec<&'a [CompactPlane]>);
-
-/// The planes of the sources of a view after the stage `S`, in the order of its source list; empty where nothing is known.
-pub struct SourcePlanes<'a, S> {
-    planes: Vec<&'a [PixelEstimate]>,
-    stage: PhantomData<S>,
-}
 
 /// The published surfaces of all views.
 pub struct SurfaceStore(Vec<Vec<CompactPlane>>);
 
 /// Threads that one view keeps busy.
 const THREADS_PER_VIEW: usize = 4;
-
-impl<'a, S> SourcePlanes<'a, S> {
-    /// The planes of these sources.
-    pub fn new(
-        sources: &[u32],
-        planes: impl Fn(usize) -> Option<&'a [PixelEstimate]>,
-    ) -> SourcePlanes<'a, S> {
-        let of_source = |&source: &u32| planes(source as usize).unwrap_or_default();
-        SourcePlanes { planes: sources.iter().map(of_source).collect(), stage: PhantomData }
-    }
-
-    /// By source.
-    pub fn into_vec(self) -> Vec<&'a [PixelEstimate]> {
-        self.planes
-    }
-}
-
-impl<'a> PublishedSurfaces<'a> {
-    /// The surfaces of these sources.
-    pub fn new(sources: &[u32], surface: impl Fn(usize) -> &'a [CompactPlane]) -> PublishedSurfaces<'a> {
-        PublishedSurfaces(sources.iter().map(|&source| surface(source as usize)).collect())
-    }
-}
-
-impl PublishedSurfaces<'_> {
-    /// None of these sources has one.
-    pub fn none(sources: &[u32]) -> Self {
-        PublishedSurfaces(vec![&[]; sources.len()])
-    }
-}
 
 impl SurfaceStore {
     /// Those of a view's sources.
@@ -106,9 +66,9 @@ impl Store<Option<ViewEstimate<Checked>>> {
         Store((0..views).map(|_| None).collect())
     }
 
-    /// The estimates that are known.
-    pub fn known(&self) -> impl Iterator<Item = &ViewEstimate<Checked>> {
-        self.0.iter().flatten()
+    /// The record of the last cycle of every view.
+    pub fn last_records(&self) -> impl Iterator<Item = &CycleRecord> {
+        self.0.iter().flatten().filter_map(|own| own.cycles().last())
     }
 
     /// After the first cycle all are known.
