@@ -69,7 +69,8 @@ extern "C" {
 /* ---- Objects ------------------------------------------------------------------------------------------- */
 
 /**
- * Planes of other views, transferred to the pixels of a view. Immutable.
+ * Planes of other views, transferred to the pixels of a view. Immutable. They cannot be saved: transfer and
+ * search of a view run in the same process.
  */
 typedef struct skep_candidates skep_candidates;
 
@@ -79,8 +80,8 @@ typedef struct skep_candidates skep_candidates;
 typedef struct skep_cloud skep_cloud;
 
 /**
- * Planes, costs and view sets of the pixels of one view after a search, or after the check that follows.
- * Immutable.
+ * Planes and costs of the pixels of one view after a search, or after the check that follows; before the
+ * check also the view sets that it uses. Immutable.
  */
 typedef struct skep_estimate skep_estimate;
 
@@ -275,8 +276,9 @@ size_t skep_last_error(char *buffer, size_t capacity);
  *       their number (equation 3 of the paper).
  *       whole number, 0 to 8, views; default: 4, fast: 3, paper: 0
  *   cost.max_views_per_pixel
- *       From the second cycle on, match a pixel only with this many views of its set, those of lowest cost; 0
- *       takes the whole set.
+ *       From the second cycle on, match a pixel only with this many views of its set: those whose validated
+ *       surfaces its plane agrees with best, or of lowest cost where too few of them agree; 0 takes the whole
+ *       set.
  *       whole number, at least 0, views; default: 5, fast: 4, paper: 0
  *   cost.geom_consistency_weight
  *       Geometric consistency: cost at the largest error against the validated depth of a source view; 0
@@ -375,7 +377,8 @@ size_t skep_last_error(char *buffer, size_t capacity);
  *
  * Refinement: filters of the planes beyond the paper.
  *   refine.fattening_passes
- *       Passes of the correction of foreground fattening after the last check of each scale; 0 turns it off.
+ *       Passes of the correction of foreground fattening after a check that may be the last of its scale; 0
+ *       turns it off.
  *       whole number, 0 to 100, passes; default: 2, paper: 0
  *   refine.smoothing_passes
  *       Passes of plane smoothing after each check; 0 turns it off.
@@ -1540,17 +1543,20 @@ skep_status skep_stepper_search(const struct skep_stepper *stepper,
 /**
  * Checks the planes of a view, and prepares them for the next cycle. Four stages, in this order:
  *
- *   1. consistency check: compares the planes with those of the source views; writes the consistent and
- *      validated flags
+ *   1. consistency check: compares the planes with those of the source views; writes the
+ *      number of consistent views, and which planes are validated
  *   2. correction of foreground fattening, if the scale may end with this cycle (option
  *      "refine.fattening_passes"): gives pixels beside a depth edge the plane of the surface that their gray
- *      values belong to, or none; changes depths, normals and flags
+ *      values belong to, or none; changes depths and normals, and in the last
+ *      cycle takes the validation of some
  *   3. plane smoothing (option "refine.smoothing_passes"): changes depths and normals
  *   4. publication of the validated surface, which the searches of the next cycle and the averaging of
  *      skep_stepper_finish read
  *
- * So the call changes depths, normals and flags, in the new estimate. It reads the searched planes of the
- * same cycle of the view's sources; a source without an estimate takes no part in the check.
+ * So the new estimate differs in depths, normals, numbers of consistent views and validation; the view sets
+ * are dropped, costs stay. The call reads depths and normals of the view's sources, searched in the same
+ * cycle; for a source with maps of the host's own (skep_estimate_from_maps) its checked estimate is taken. A
+ * source without an estimate takes no part in the check.
  *
  * @param stepper         The stepper.
  * @param cycle           Number of the cycle.
@@ -1888,8 +1894,8 @@ void skep_ncc_window_destroy(struct skep_ncc_window *window);
 /**
  * Computes the normalized cross-correlation (NCC) of patches of the reference image with the patches of the
  * source image that homographies map them to. Samples outside of the reference image have no weight; outside
- * of the source image its border is repeated. The source is interpolated bilinearly at positions rounded to
- * 1/256 pixel, so that an NCC differs from the exact one by some 1e-4.
+ * of the source image its border is repeated. The source is interpolated bilinearly at positions truncated
+ * to 1/256 pixel, so that an NCC differs from the exact one by some 1e-4.
  *
  * Consecutive patches at the same pixel share the samples of the reference: sort by pixel.
  *

@@ -170,7 +170,7 @@
 //! - Two views are the least; the default validates what two other views confirm, and fuses what three
 //!   confirm.
 
-// The library is a guest: it prints nothing and ends no process.
+// The library runs inside a host process: it prints nothing and does not exit.
 #![warn(clippy::print_stdout, clippy::print_stderr, clippy::exit)]
 
 mod ambc;
@@ -216,7 +216,7 @@ pub use scene::{Maps, PixelStatus, Scene, SparsePoint, View};
 #[doc = include_str!("how_it_works.md")]
 pub mod how_it_works {}
 
-/// The rooms of the source, the data flow and the invariants.
+/// The modules of the source, the data flow and the invariants.
 ///
 #[doc = include_str!("../docs/architecture.md")]
 pub mod architecture {}

@@ -42,10 +42,10 @@ def test_maps_fit_each_other(result):
 def test_source_counts_are_those_of_the_source_sets(result, scene):
     for view in result:
         assert view.sources == scene.sources(view.view, made.options())
-        matched = np.sum([view.matched_with(source) for source in view.sources], axis=0)
+        matched = np.sum([view.visible_in(source) for source in view.sources], axis=0)
         assert np.array_equal(matched, view.source_count)
     with pytest.raises(skep.ArgumentError, match="source is 99"):
-        result[0].matched_with(99)
+        result[0].visible_in(99)
 
 
 def test_raw_maps_are_the_memory_of_the_result(result):

@@ -7,7 +7,7 @@
 namespace skep {
 inline namespace SKEP_FLAVOR {
 
-/// The views each pixel was matched with.
+/// The view set of each pixel.
 struct ConsistencyGraph {
     Size size;
     ViewLists lists;

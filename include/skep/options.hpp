@@ -64,8 +64,9 @@
 //       their number (equation 3 of the paper).
 //       whole number, 0 to 8, views; default: 4, fast: 3, paper: 0
 //   cost.max_views_per_pixel
-//       From the second cycle on, match a pixel only with this many views of its set, those of lowest cost; 0
-//       takes the whole set.
+//       From the second cycle on, match a pixel only with this many views of its set: those whose validated
+//       surfaces its plane agrees with best, or of lowest cost where too few of them agree; 0 takes the whole
+//       set.
 //       whole number, at least 0, views; default: 5, fast: 4, paper: 0
 //   cost.geom_consistency_weight
 //       Geometric consistency: cost at the largest error against the validated depth of a source view; 0
@@ -164,7 +165,8 @@
 //
 // Refinement: filters of the planes beyond the paper.
 //   refine.fattening_passes
-//       Passes of the correction of foreground fattening after the last check of each scale; 0 turns it off.
+//       Passes of the correction of foreground fattening after a check that may be the last of its scale; 0
+//       turns it off.
 //       whole number, 0 to 100, passes; default: 2, paper: 0
 //   refine.smoothing_passes
 //       Passes of plane smoothing after each check; 0 turns it off.

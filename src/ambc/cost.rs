@@ -216,7 +216,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     }
 
     /// Finds the costs by which the views are ranked: the geometric ones where surfaces of at least `count` views agree, else
-    /// with the photometric ones; whether with them.
+    /// with the photometric ones. Returns whether the photometric costs were computed.
     #[inline(always)]
     fn rank_views(&mut self, food: &FoodSource, count: usize) -> bool {
         self.project(food);

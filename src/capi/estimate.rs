@@ -7,8 +7,8 @@ use super::stepper::skep_stepper;
 use crate::pipeline::{AnyEstimate, OwnMaps, ViewEstimate};
 use crate::scene::Maps;
 
-/// Planes, costs and view sets of the pixels of one view after a search, or after the check that follows.
-/// Immutable.
+/// Planes and costs of the pixels of one view after a search, or after the check that follows; before the
+/// check also the view sets that it uses. Immutable.
 pub struct skep_estimate {
     estimate: AnyEstimate,
 }

@@ -240,8 +240,8 @@ pub unsafe extern "C" fn skep_ncc_window_destroy(window: *mut skep_ncc_window) {
 
 /// Computes the normalized cross-correlation (NCC) of patches of the reference image with the patches of the
 /// source image that homographies map them to. Samples outside of the reference image have no weight; outside
-/// of the source image its border is repeated. The source is interpolated bilinearly at positions rounded to
-/// 1/256 pixel, so that an NCC differs from the exact one by some 1e-4.
+/// of the source image its border is repeated. The source is interpolated bilinearly at positions truncated
+/// to 1/256 pixel, so that an NCC differs from the exact one by some 1e-4.
 ///
 /// Consecutive patches at the same pixel share the samples of the reference: sort by pixel.
 ///

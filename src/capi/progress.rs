@@ -64,7 +64,7 @@ impl Host {
         Host { callback, user, last_call: Mutex::new(None), cancelled: AtomicBool::new(false) }
     }
 
-    /// The hook of a run: tells the host, unless another thread is doing so or it was told a moment ago.
+    /// Calls the callback, at most once per [`INTERVAL`] and from one thread at a time.
     pub fn tell(&self, at: &Progress) -> ControlFlow<()> {
         if let Some(callback) = self.callback
             && !self.cancelled.load(Ordering::Relaxed)

@@ -9,7 +9,8 @@ use super::stepper::{SKEP_CYCLE_NONE, skep_stepper};
 use crate::pipeline::{AnyEstimate, Candidates, Checked, EstimateRef, Place, ViewEstimate};
 use std::ffi::c_void;
 
-/// Planes of other views, transferred to the pixels of a view. Immutable.
+/// Planes of other views, transferred to the pixels of a view. Immutable. They cannot be saved: transfer and
+/// search of a view run in the same process.
 pub struct skep_candidates {
     candidates: Candidates,
 }
@@ -164,17 +165,20 @@ pub unsafe extern "C" fn skep_stepper_search(
 
 /// Checks the planes of a view, and prepares them for the next cycle. Four stages, in this order:
 ///
-///   1. consistency check: compares the planes with those of the source views; writes the consistent and
-///      validated flags
+///   1. consistency check: compares the planes with those of the source views; writes the
+///      number of consistent views, and which planes are validated
 ///   2. correction of foreground fattening, if the scale may end with this cycle (option
 ///      "refine.fattening_passes"): gives pixels beside a depth edge the plane of the surface that their gray
-///      values belong to, or none; changes depths, normals and flags
+///      values belong to, or none; changes depths and normals, and in the last
+///      cycle takes the validation of some
 ///   3. plane smoothing (option "refine.smoothing_passes"): changes depths and normals
 ///   4. publication of the validated surface, which the searches of the next cycle and the averaging of
 ///      skep_stepper_finish read
 ///
-/// So the call changes depths, normals and flags, in the new estimate. It reads the searched planes of the
-/// same cycle of the view's sources; a source without an estimate takes no part in the check.
+/// So the new estimate differs in depths, normals, numbers of consistent views and validation; the view sets
+/// are dropped, costs stay. The call reads depths and normals of the view's sources, searched in the same
+/// cycle; for a source with maps of the host's own (skep_estimate_from_maps) its checked estimate is taken. A
+/// source without an estimate takes no part in the check.
 ///
 /// @param stepper         The stepper.
 /// @param cycle           Number of the cycle.

@@ -1,5 +1,4 @@
-//! What the estimates of several views say about each other: the consistency check, propagation of planes to other views
-//! (section 5.6 of the paper), and averaging across views.
+//! Operations across views: the consistency check and the propagation of planes (section 5.6 of the paper), and averaging.
 
 mod averaging;
 mod consistency;

@@ -21,8 +21,9 @@
 //     return clamp(1 - cov / sqrt(var_a * var_b), 0, 2)
 //
 // A scalar loop that does just this takes 380 ns for a patch of 36 samples. The code below computes the same
-// cost, up to rounding, with five deviations. Each says what it buys: in ns per patch, or as the time of a
-// whole run with it over that without it.
+// cost, up to rounding, with five deviations: the second truncates sample positions, the others change layout
+// and order only. Each says what it buys: in ns per patch, or as the time of a whole run with it over that
+// without it.
 //
 // 1. Packed taps. The source image is not an array of gray values but of pairs of bytes, a pixel and the one
 //    below it (`Taps`), so that one 32-bit load brings the 2 x 2 pixels of a bilinear sample. With AVX2 a

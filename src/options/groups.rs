@@ -124,8 +124,8 @@ options! {
         /// Mean over the best views of the pixel's view set; 0 takes the sum over all divided by one less than their
         /// number (equation 3 of the paper).
         best_views: count(0 to 8) "views",
-        /// From the second cycle on, match a pixel only with this many views of its set, those of lowest cost; 0 takes
-        /// the whole set.
+        /// From the second cycle on, match a pixel only with this many views of its set: those whose validated surfaces
+        /// its plane agrees with best, or of lowest cost where too few of them agree; 0 takes the whole set.
         max_views_per_pixel: count(0 to 4294967295) "views",
         /// Geometric consistency: cost at the largest error against the validated depth of a source view; 0 turns the
         /// term off.
@@ -202,7 +202,8 @@ options! {
 
     /// Refinement: filters of the planes beyond the paper.
     refine: RefineOptions {
-        /// Passes of the correction of foreground fattening after the last check of each scale; 0 turns it off.
+        /// Passes of the correction of foreground fattening after a check that may be the last of its scale; 0 turns it
+        /// off.
         fattening_passes: count(0 to 100) "passes",
         /// Passes of plane smoothing after each check; 0 turns it off.
         smoothing_passes: count(0 to 100) "passes",

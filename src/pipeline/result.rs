@@ -19,7 +19,7 @@ pub struct ViewResult {
     pub status: Vec<PixelStatus>,
     /// The view's source views, as indices into the scene; `view_sets` counts along this list.
     pub sources: Vec<u32>,
-    /// The source views each pixel was matched with.
+    /// The view set of each pixel: the source views that see its raw plane.
     pub view_sets: ViewSets,
     /// Work done for the view.
     pub counts: Counts,

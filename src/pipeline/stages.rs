@@ -142,8 +142,8 @@ pub fn search(
     })
 }
 
-/// Fills textureless regions from the planes around them; determines the view sets of the filled pixels. Reads the images of
-/// the sources.
+/// Fills textureless regions from the planes around them; determines the view sets of the filled pixels. Reads the images
+/// and the published surfaces of the sources.
 pub fn fill_textureless(
     context: &RunContext,
     problem: &Problem,
@@ -159,7 +159,7 @@ pub fn fill_textureless(
         let rules = SearchRules::new(&context.options, &cycle.scale, cycle.cycle, false).view_set;
         select_sets(problem, rules, &mut view_sets, &pixels_with_planes(&filled, planes));
     }
-    // In a search the flag says that a plane comes from a validated one; a verdict it gets from the check.
+    // During a search `validated` marks planes that come from validated ones; the check sets it anew.
     planes.par_iter_mut().for_each(|plane| plane.validated = false);
     searched.stage.view_sets = view_sets;
     searched
@@ -217,8 +217,8 @@ pub fn apply_check(own: ViewEstimate<Searched>, verdicts: &[Verdict]) -> ViewEst
     checked
 }
 
-/// Corrects foreground fattening where a scale may end: changes depths, normals and, in the last cycle, verdicts of validated
-/// pixels at edges.
+/// Corrects foreground fattening where the scale may end, as far as the view knows: changes depths and normals of validated
+/// pixels at edges; in the last cycle some lose their validation.
 pub fn correct_fattening(context: &RunContext, own: &mut ViewEstimate<Unpublished>) {
     if context.may_end_scale(own.cycle(), own.cycles().last()) {
         let filter = CorrectFattening {
@@ -314,7 +314,7 @@ pub fn recheck(
     Ok(FilledGaps(confirmed.collect()))
 }
 
-/// Determines view set, confidence and status of every pixel.
+/// Determines view set, confidence and status of every pixel. Reads images and published surfaces of the sources.
 pub fn classify(
     context: &RunContext,
     problem: &Problem,

@@ -3,7 +3,7 @@
 //! | filter | when | replaces |
 //! |---|---|---|
 //! | [`FillTextureless`] | after every search | planes in and around textureless regions |
-//! | [`CorrectFattening`] | after the last check of a scale | validated planes |
+//! | [`CorrectFattening`] | after a check that may be the last of its scale | validated planes |
 //! | [`SmoothPlanes`] | after every check | validated planes |
 //! | [`FillGaps`] | after the last cycle | planes that are not validated |
 //!

@@ -51,12 +51,12 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Checks every view and point and settles each view's depth range: its own, else the 1st to 99th percentile of
+    /// Checks every view and point and determines each view's depth range: its own, else the 1st to 99th percentile of
     /// the depths of the sparse points it saw, from three quarters of the one to twice the other.
     ///
     /// # Errors
     /// Fewer than two views; a name that occurs twice; a picture or mask of another size than its camera; a camera,
-    /// range or point that is not finite or makes no sense; a point or source list that names a view there is not, or a
+    /// range or point that is not finite or makes no sense; a point or source list that names no view of the scene, or a
     /// source list that names the view itself or a view twice; a view with neither range nor sparse points.
     pub fn new(views: Vec<View>, points: Vec<SparsePoint>) -> Result<Scene> {
         if views.len() < 2 {

@@ -132,7 +132,7 @@ mod tests {
         for (cost, kept) in costs.into_iter().zip(kept) {
             assert!(kept == cost || (kept - cost).abs() <= cost / 256.0, "{kept} for {cost}");
         }
-        assert_eq!(size_of::<PixelEstimate>(), 20, "the cost takes no room of its own");
+        assert_eq!(size_of::<PixelEstimate>(), 20, "the cost takes no bytes of its own");
     }
 
     #[test]

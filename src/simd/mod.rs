@@ -1,6 +1,6 @@
 //! Vectors of eight f32 lanes behind one trait, with one back-end per instruction set, chosen at run time.
 //!
-//! This room holds all architecture code of the crate. The kernels are written once, generic over [`Simd`],
+//! This module holds all architecture code of the crate. The kernels are written once, generic over [`Simd`],
 //! and compiled once per back-end:
 //!
 //! | level | back-end | instructions |

@@ -96,8 +96,9 @@ class Options(Mapping[str, Value]):
     """Mean over the best views of the pixel's view set; 0 takes the sum over all divided by one less than
     their number (equation 3 of the paper). (whole number, 0 to 8, views; default: 4, fast: 3, paper: 0)"""
     cost_max_views_per_pixel: int
-    """From the second cycle on, match a pixel only with this many views of its set, those of lowest cost; 0
-    takes the whole set. (whole number, at least 0, views; default: 5, fast: 4, paper: 0)"""
+    """From the second cycle on, match a pixel only with this many views of its set: those whose validated
+    surfaces its plane agrees with best, or of lowest cost where too few of them agree; 0 takes the whole set.
+    (whole number, at least 0, views; default: 5, fast: 4, paper: 0)"""
     cost_geom_consistency_weight: float
     """Geometric consistency: cost at the largest error against the validated depth of a source view; 0 turns
     the term off. (number, 0 to 1000, cost; default: 0.3, paper: 0)"""
@@ -173,8 +174,8 @@ class Options(Mapping[str, Value]):
     """Leave source views whose own depth is clearly smaller out of that fraction: they may be occluded there.
     (switch, true or false; default: true, paper: false)"""
     refine_fattening_passes: int
-    """Passes of the correction of foreground fattening after the last check of each scale; 0 turns it off.
-    (whole number, 0 to 100, passes; default: 2, paper: 0)"""
+    """Passes of the correction of foreground fattening after a check that may be the last of its scale; 0
+    turns it off. (whole number, 0 to 100, passes; default: 2, paper: 0)"""
     refine_smoothing_passes: int
     """Passes of plane smoothing after each check; 0 turns it off. (whole number, 0 to 100, passes; default:
     1, fast: 2, paper: 0)"""

@@ -143,14 +143,14 @@ class ResultView:
         """The source views of the view, as numbers of the scene's views."""
         return take_indices(lambda *out: lib.skep_result_get_sources(self._handle, self.view, *out))
 
-    def matched_with(self, source: int) -> NDArray[np.bool_]:
-        """Which pixels were matched with a source view of `sources`."""
+    def visible_in(self, source: int) -> NDArray[np.bool_]:
+        """The pixels that have a source view of `sources` in their view set."""
         if source not in self.sources:
             raise ArgumentError(f"source is {source}: must be one of {self.sources}")
         word, bit = divmod(self.sources.index(source), 32)
         words = self._copy(lib.skep_result_get_source_bits, (word,), np.uint32)
-        matched: NDArray[np.bool_] = (words >> np.uint32(bit)) & np.uint32(1) != 0
-        return matched
+        visible: NDArray[np.bool_] = (words >> np.uint32(bit)) & np.uint32(1) != 0
+        return visible
 
     @cached_property
     def statistics(self) -> Statistics:
