@@ -1,5 +1,5 @@
-//! The stages of a run, one function each: what it reads are its arguments, what it changes is what it returns or takes by
-//! `&mut`. The order is in [`pipeline`](super).
+//! The stages of a run, one function each: what it reads are its arguments, what it changes is what it
+//! returns or takes by `&mut`. The order is in [`pipeline`](super).
 
 use super::context::{Place, RunContext};
 use super::estimate::{Checked, Searched, Unfilled, Unpublished, ViewEstimate, maps_of};
@@ -24,7 +24,8 @@ use crate::scene::{PixelEstimate, PlaneMap, ScaledView, Scene, Verdict};
 use crate::view_selection::{ViewRules, select_sets};
 use rayon::prelude::*;
 
-/// The planes that other views propagate to the pixels of a view; none in a scale's first cycle or with propagation off.
+/// The planes that other views propagate to the pixels of a view; none in a scale's first cycle or with
+/// propagation off.
 #[derive(Debug, Clone)]
 pub struct Candidates {
     pub(super) at: Place,
@@ -46,8 +47,8 @@ impl Candidates {
     }
 }
 
-/// Takes an estimate to the scale of a cycle: each pixel gets the plane of its coarse pixel. One that is on that scale already
-/// stays as it is.
+/// Upsamples an estimate to the scale of a cycle: each pixel gets the plane of its coarse pixel. An estimate
+/// that is already on that scale is unchanged.
 pub fn upsample(
     context: &RunContext,
     at: Place,
@@ -67,8 +68,8 @@ pub fn upsampled(context: &RunContext, at: Place, own: &ViewEstimate<Checked>) -
     ViewEstimate { at, map, counts: own.counts, cycles: own.cycles.clone(), stage: Checked { surface } }
 }
 
-/// The candidates for the pixels of a view without a validated plane: the consistent planes of the views that have it among
-/// their sources (section 5.6.1 of the paper).
+/// The candidates for the pixels of a view without a validated plane: the consistent planes of the views that
+/// have it among their sources (section 5.6.1 of the paper).
 pub fn propagate(
     context: &RunContext,
     at: Place,
@@ -89,7 +90,7 @@ pub fn propagate(
     Ok(Candidates { at, pixels: camera.pixels(), planes })
 }
 
-/// What a search starts from, besides the published surfaces of the sources.
+/// The input of a search besides the published surfaces of the sources.
 #[derive(Clone, Copy)]
 pub struct SearchInput<'a> {
     /// The view's own estimate of the cycle before, on this scale; `None` starts at random.
@@ -141,8 +142,8 @@ pub fn search(
     })
 }
 
-/// Fills textureless regions from the planes around them; determines the view sets of the filled pixels. Reads the images of
-/// the sources.
+/// Fills textureless regions from the planes around them; determines the view sets of the filled pixels.
+/// Reads the images of the sources.
 pub fn fill_textureless(
     context: &RunContext,
     problem: &Problem,
@@ -158,7 +159,7 @@ pub fn fill_textureless(
         let rules = SearchRules::new(&context.options, &cycle.scale, cycle.cycle, false).view_set;
         select_sets(problem, rules, &mut view_sets, &pixels_with_planes(&filled, planes));
     }
-    // In a search the flag says that a plane comes from a validated one; a verdict it gets from the check.
+    // During a search the flag marks planes that come from validated ones; the check sets the verdict.
     planes.par_iter_mut().for_each(|plane| plane.validated = false);
     searched.stage.view_sets = view_sets;
     searched
@@ -209,15 +210,15 @@ pub fn check(
     check.run()
 }
 
-/// Writes the verdicts of a check into the planes they were made for.
+/// Writes the verdicts of a check into the checked planes.
 pub fn apply_check(own: ViewEstimate<Searched>, verdicts: &[Verdict]) -> ViewEstimate<Unpublished> {
     let (mut checked, _) = own.into_stage(Unpublished);
     checked.map.set_verdicts(verdicts);
     checked
 }
 
-/// Corrects foreground fattening where a scale may end: changes depths, normals and, in the last cycle, verdicts of validated
-/// pixels at edges.
+/// Corrects foreground fattening where a scale may end: changes depths, normals and, in the last cycle,
+/// verdicts of validated pixels at edges.
 pub fn correct_fattening(context: &RunContext, own: &mut ViewEstimate<Unpublished>) {
     if context.may_end_scale(own) {
         let filter = CorrectFattening {
@@ -277,8 +278,8 @@ pub fn fill_gaps(context: &RunContext, at: Place, averaged: &[PixelEstimate]) ->
     FilledGaps(filled.into_iter().map(|pixel| (pixel, planes[pixel as usize])).collect())
 }
 
-/// Those of the filled planes that the planes of the sources, as they were before averaging, validate more closely than the
-/// check asks for.
+/// The filled planes that are consistent with the planes of the sources before averaging, within tighter
+/// tolerances than those of the check.
 pub fn recheck(
     context: &RunContext,
     problem: &Problem,
@@ -325,7 +326,7 @@ pub fn classify(
         problem,
         window: context.window(own.cycle()),
         cost: CostRules::new(&context.options, false),
-        // A set that falls back to all views would hide that none sees the plane.
+        // A set that falls back to all views would hide that the plane is not visible in any.
         view_set: ViewRules::new(&context.options, 0),
         level: context.level,
         advance,
@@ -347,8 +348,8 @@ pub fn classify(
     })
 }
 
-/// Fuses the validated pixels of all views into points (section 6 of the paper). Reads the results of the views that saw a
-/// sparse point together with a view.
+/// Fuses the validated pixels of all views into points (section 6 of the paper). Reads the results of the
+/// views that share a sparse point with a view.
 pub fn fuse(
     scene: &Scene,
     options: &Options,

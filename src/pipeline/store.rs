@@ -1,5 +1,5 @@
-//! What a run keeps of each view between stages, today in memory. Stages take planes and surfaces of other views from here
-//! in named types, by the source list of the view they work on.
+//! The data of each view between stages, in memory. Stages get planes and surfaces of other views from here
+//! in named types, in the order of the source list of their view.
 
 use super::estimate::{Checked, ViewEstimate};
 use crate::error::Result;
@@ -10,11 +10,12 @@ use std::marker::PhantomData;
 /// One value for each view.
 pub struct Store<T>(Vec<T>);
 
-/// The surfaces that the sources of a view published after a check, in the order of its source list; empty where nothing is
-/// known.
+/// The surfaces that the sources of a view published after a check, in the order of its source list; empty
+/// where there is no estimate.
 pub struct PublishedSurfaces<'a>(pub Vec<&'a [CompactPlane]>);
 
-/// The planes of the sources of a view after the stage `S`, in the order of its source list; empty where nothing is known.
+/// The planes of the sources of a view after the stage `S`, in the order of its source list; empty where
+/// there is no estimate.
 pub struct SourcePlanes<'a, S> {
     planes: Vec<&'a [PixelEstimate]>,
     stage: PhantomData<S>,
@@ -50,22 +51,22 @@ impl<'a> PublishedSurfaces<'a> {
 }
 
 impl PublishedSurfaces<'_> {
-    /// None of these sources has one.
+    /// Empty surfaces for these sources.
     pub fn none(sources: &[u32]) -> Self {
         PublishedSurfaces(vec![&[]; sources.len()])
     }
 }
 
 impl SurfaceStore {
-    /// Those of a view's sources.
+    /// The surfaces of a view's sources.
     pub fn of_sources(&self, sources: &[u32]) -> PublishedSurfaces<'_> {
         PublishedSurfaces::new(sources, |source| &self.0[source])
     }
 }
 
 impl<T: Send> Store<T> {
-    /// Does the same for all views, some at a time: the threads share the work on one view, and while there is not enough of
-    /// it for all of them they work on another one. More views at a time would take more memory.
+    /// Runs a stage for all views, a few at a time: the threads share the work of a view, and those without
+    /// work in it take that of another one. The limit on concurrent views bounds the memory.
     pub fn map<R: Send>(self, stage: impl Fn(usize, T) -> Result<R> + Sync) -> Result<Store<R>> {
         let at_a_time = 1 + (rayon::current_num_threads() + THREADS_PER_VIEW / 2) / THREADS_PER_VIEW;
         let mut turns: Vec<Vec<(usize, T)>> = (0..at_a_time).map(|_| Vec::new()).collect();
@@ -81,7 +82,7 @@ impl<T: Send> Store<T> {
         Ok(Store(done.into_iter().map(|(_, result)| result).collect()))
     }
 
-    /// The same with the values of all views kept.
+    /// Like `map`, but keeps the values of all views.
     pub fn map_ref<R: Send>(&self, stage: impl Fn(usize, &T) -> Result<R> + Sync) -> Result<Store<R>>
     where
         T: Sync,
@@ -101,17 +102,17 @@ impl<T: Send> Store<T> {
 }
 
 impl Store<Option<ViewEstimate<Checked>>> {
-    /// Before the first cycle.
+    /// No estimates, as before the first cycle.
     pub fn unknown(views: usize) -> Self {
         Store((0..views).map(|_| None).collect())
     }
 
-    /// The estimates that are known.
+    /// The estimates of the views that have one.
     pub fn known(&self) -> impl Iterator<Item = &ViewEstimate<Checked>> {
         self.0.iter().flatten()
     }
 
-    /// After the first cycle all are known.
+    /// The estimates of all views, which exist after the first cycle.
     pub fn all_known(self) -> Store<ViewEstimate<Checked>> {
         Store(self.0.into_iter().flatten().collect())
     }
