@@ -1,4 +1,5 @@
-//! Sets the SONAME of the shared library, and writes the file with the version that `cargo cinstall` installs.
+//! Sets the SONAME of the shared library, and writes the file with the version that `cargo cinstall`
+//! installs.
 
 use std::path::Path;
 

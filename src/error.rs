@@ -23,7 +23,7 @@ pub enum Error {
         /// What was expected instead.
         expected: String,
     },
-    /// A file cannot be read, understood or written.
+    /// A file cannot be read, parsed or written.
     File {
         /// The file.
         path: PathBuf,
@@ -40,7 +40,7 @@ pub enum Error {
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
-    /// An argument is wrong; `expected` says what would have been right.
+    /// An argument is wrong; `expected` describes the valid values.
     pub fn argument(name: impl Into<String>, value: impl fmt::Display, expected: impl Into<String>) -> Self {
         Error::Argument { name: name.into(), value: value.to_string(), expected: expected.into() }
     }

@@ -35,8 +35,8 @@
 //! # Ok::<(), skep::Error>(())
 //! ```
 //!
-//! **A run taken apart** ([`Stepper`]) searches, checks and finishes single views, for a host that schedules
-//! them itself, on one machine or many, or that brings maps of its own. It gives the same bits as
+//! **A stepwise run** ([`Stepper`]) searches, checks and finishes single views, for a host that schedules
+//! them itself, on one machine or many, or provides maps of its own. It gives the same bits as
 //! [`reconstruct`]:
 //!
 //! ```
@@ -56,7 +56,7 @@
 //!                 *own = stepper.upsample(cycle, own)?;
 //!             }
 //!         }
-//!         // Before the first cycle nothing is known of any view.
+//!         // Before the first cycle no view has an estimate.
 //!         let before: Vec<_> = (0..stepper.views()).map(|view| estimates.get(view)).collect();
 //!         let search = |view| {
 //!             let candidates = stepper.propagate(cycle, view, &before)?;
@@ -170,7 +170,7 @@
 //! - Two views are the least; the default validates what two other views confirm, and fuses what three
 //!   confirm.
 
-// The library runs inside a host process: it prints nothing and does not exit.
+// The library neither prints nor exits the process.
 #![warn(clippy::print_stdout, clippy::print_stderr, clippy::exit)]
 
 mod ambc;

@@ -1,5 +1,5 @@
-//! A small world for the unit tests of single steps: cameras in a row before a slanted wall with texture, of which
-//! everything is known exactly.
+//! The synthetic scene of the unit tests: cameras in a row in front of a slanted textured wall, with exact
+//! depths and normals.
 
 use crate::ambc::Random;
 use crate::geometry::DepthRange;
@@ -13,14 +13,14 @@ use crate::scene::CompactPlane;
 use crate::scene::{PixelEstimate, PlaneMap};
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
-/// The wall's depths lie well inside.
+/// Contains the wall's depths with a margin.
 pub const RANGE: DepthRange = DepthRange { near: 2.0, far: 12.0 };
 
-/// The first view is the problem, the others are its sources.
+/// The first view is the reference, the others are its sources.
 pub struct World {
     pub cameras: Vec<Camera>,
     pub images: Vec<PackedImage>,
-    /// The validated solutions the sources show; none at first.
+    /// The published surfaces of the sources; empty by default.
     pub surfaces: Vec<Vec<CompactPlane>>,
 }
 
@@ -35,7 +35,7 @@ pub fn gray(point: DVec3) -> u8 {
     (127.0 + 55.0 * waves).round() as u8
 }
 
-/// Normally distributed with deviation 1, near enough.
+/// A sample of an approximate normal distribution with standard deviation 1.
 pub fn white(random: &mut Random) -> f32 {
     (0..12).map(|_| random.unit()).sum::<f32>() - 6.0
 }
@@ -74,7 +74,8 @@ pub fn exact(camera: &Camera) -> PlaneMap {
     PlaneMap { planes: (0..camera.pixels()).map(plane).collect() }
 }
 
-/// A camera at `x` on a line parallel to the wall's foot, turned so that it sees the same part of the wall.
+/// A camera at `x` on a horizontal line in front of the wall, turned so that it sees the same part of the
+/// wall.
 pub fn camera(x: f64, (width, height): (u32, u32)) -> Camera {
     let rotation = DMat3::from_rotation_y((x / 5.0).atan());
     Camera {
@@ -90,7 +91,7 @@ pub fn camera(x: f64, (width, height): (u32, u32)) -> Camera {
 }
 
 impl World {
-    /// Cameras at these places of the line with images of this size.
+    /// Cameras at these positions on the line with images of this size.
     pub fn new(places: &[f64], size: (u32, u32)) -> World {
         let cameras: Vec<Camera> = places.iter().map(|&x| camera(x, size)).collect();
         let image = |camera: &Camera| {

@@ -1,4 +1,4 @@
-//! Fusion of maps into points, on maps that are known exactly or are wrong in known ways.
+//! Fusion of exact maps and of maps with known errors.
 
 mod common;
 
@@ -44,7 +44,7 @@ fn mean_error(made: &Procedural, cloud: &PointCloud) -> f64 {
     cloud.positions.iter().map(|&point| error(made, point)).sum::<f64>() / cloud.positions.len() as f64
 }
 
-/// Numbers that look random, from -1 to 1.
+/// A pseudo-random number from -1 to 1.
 fn noise(seed: usize) -> f64 {
     let hash = (seed as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     ((hash ^ hash >> 32).wrapping_mul(0xd6e8_feb8_6659_fd93) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
@@ -97,7 +97,7 @@ fn the_cloud_keeps_about_one_point_for_each_surface_pixel() {
 }
 
 #[test]
-fn noise_averages_down() {
+fn averaging_reduces_noise() {
     let made = procedural::plane_and_sphere();
     let maps = noisy(&made.truth, 0.004);
     let alone = fuse_maps(&made, &maps, FusionOptions { min_views: 0, depth_tolerance: 0.0, ..OPTIONS });
@@ -107,7 +107,7 @@ fn noise_averages_down() {
 }
 
 #[test]
-fn one_view_that_is_off_within_the_tolerance_does_not_pull_the_points() {
+fn one_view_with_an_error_within_the_tolerance_does_not_bias_the_points() {
     let made = procedural::plane_and_sphere();
     let mut maps = noisy(&made.truth, 0.0005);
     let without = mean_error(&made, &fuse_maps(&made, &maps, OPTIONS));
@@ -130,27 +130,29 @@ fn a_wrong_region_in_one_view_is_dropped() {
     }
 }
 
-/// What views see with a thing that is not there hovering before the wall in the first `ghosts` of them.
-fn haunted(ghosts: usize) -> (Procedural, Vec<Maps>, f64) {
+/// Maps of a wall in which the first `outliers` views have a false surface in front of it.
+fn with_false_surface(outliers: usize) -> (Procedural, Vec<Maps>, f64) {
     let wall = procedural::wall(Texture::Noise);
     let depth = -0.6;
-    let ghost = Shape::upright(DVec3::Z * depth, 0.0, DVec2::splat(0.4));
+    let false_surface = Shape::upright(DVec3::Z * depth, 0.0, DVec2::splat(0.4));
     let cameras = &procedural::cameras()[..7];
-    let with = Procedural::new(vec![Surface { shape: ghost, texture: Texture::Noise }, wall], cameras);
+    let with =
+        Procedural::new(vec![Surface { shape: false_surface, texture: Texture::Noise }, wall], cameras);
     let without = Procedural::new(vec![wall], cameras);
-    let maps = (0..7).map(|view| if view < ghosts { &with } else { &without }.truth[view].clone()).collect();
+    let maps =
+        (0..7).map(|view| if view < outliers { &with } else { &without }.truth[view].clone()).collect();
     (without, maps, depth)
 }
 
 #[test]
-fn what_more_views_see_through_than_support_is_dropped() {
-    let ghost_points = |ghosts: usize| {
-        let (made, maps, depth) = haunted(ghosts);
+fn a_surface_with_more_conflicting_than_consistent_views_is_dropped() {
+    let false_points = |outliers: usize| {
+        let (made, maps, depth) = with_false_surface(outliers);
         let cloud = fuse_maps(&made, &maps, FusionOptions { min_views: 2, ..OPTIONS });
         cloud.positions.iter().filter(|point| (point[2] - depth).abs() < 0.1).count()
     };
-    assert_eq!(ghost_points(3), 0, "three views for it, four against it");
-    assert!(ghost_points(4) > 300, "four views for it, three against it");
+    assert_eq!(false_points(3), 0, "three consistent views, four conflicting ones");
+    assert!(false_points(4) > 300, "four consistent views, three conflicting ones");
 }
 
 #[test]
@@ -180,7 +182,7 @@ fn only_overlapping_views_count() {
 }
 
 #[test]
-fn normals_are_unit_and_point_the_surface_s_way_in_the_world() {
+fn normals_are_unit_and_in_the_world_frame() {
     let made = procedural::plane_and_sphere();
     let mut maps = made.truth.to_vec();
     for (view, maps) in maps.iter_mut().enumerate() {
@@ -297,7 +299,7 @@ fn pixels_without_a_usable_estimate_make_no_points() {
 }
 
 #[test]
-fn far_from_the_world_s_origin_nothing_is_lost() {
+fn large_world_coordinates_lose_no_digits() {
     let mut made = procedural::plane_and_sphere();
     let here = fuse_maps(&made, &made.truth, OPTIONS);
     let away = DVec3::new(450_000.0, 5_400_000.0, 300.0);

@@ -1,4 +1,4 @@
-//! Surfaces as wholes: continued into places without texture, and smoothed.
+//! Textureless regions, gap filling, averaging, smoothing and plane fitting.
 
 mod common;
 
@@ -28,7 +28,7 @@ fn is_inside_panel(made: &Procedural, view: usize, pixel: usize) -> bool {
 }
 
 #[test]
-fn a_panel_that_shows_nothing_but_noise_continues_the_wall_around_it() {
+fn a_panel_with_noise_only_gets_the_plane_of_the_wall_around_it() {
     let made = procedural::textureless_panel().only(&[1, 3, 4, 5, 7]).with_noise(1.0);
     let recovered = |options: Options| {
         let result = run(&made, options);
@@ -46,8 +46,8 @@ fn a_panel_that_shows_nothing_but_noise_continues_the_wall_around_it() {
     let all = recovered(Options::default());
     assert!(all.count > 500, "{all:?}");
     assert!(all.value() > 0.9, "{} of the panel is validated and right", all.value());
-    // Smoothness, reward, fitted planes, cheap neighbors, edges and other views carry planes into so small a panel too:
-    // without them filling is alone, but for the coarser scale, where the panel is smaller still.
+    // All of these also propagate planes into so small a panel. Without them there is only filling, and the
+    // coarser scale, on which the panel is smaller.
     let alone = changed(Options::default(), |o| {
         o.search.smoothness_reward = 0.0;
         o.cost.smoothness_weight = 0.0;
@@ -64,7 +64,7 @@ fn a_panel_that_shows_nothing_but_noise_continues_the_wall_around_it() {
     assert!(with > 0.9 && without < with - 0.1, "{with} with filling alone and {without} without it");
 }
 
-/// Of all pixels, and of those that are validated, the ones validated within half a percent of the truth.
+/// Shares of all pixels and of the validated ones that are validated within half a percent of the truth.
 fn right_depths(made: &Procedural, options: Options) -> (Share, Share) {
     let result = run(made, options);
     let is_validated = |view: usize, pixel: usize| result.views[view].status[pixel] == PixelStatus::Validated;

@@ -1,4 +1,4 @@
-//! The whole method on procedural scenes: what comes out is held against the truth.
+//! The whole method on procedural scenes with ground truth.
 
 mod common;
 
@@ -105,9 +105,9 @@ fn every_pixel_has_a_depth_in_range_a_unit_normal_and_a_reason() {
     }
 }
 
-/// How the sets of validated wall pixels treat sources the truth says are hidden by the post, and others.
+/// View sets of validated wall pixels against the true occlusion by the post.
 struct SetShares {
-    /// Members of the sets that see the point.
+    /// Members of the sets in which the point is visible.
     precision: Share,
     /// Hidden sources that are in the set.
     hidden_kept: Share,
@@ -178,7 +178,8 @@ fn is_inside_panel(made: &Procedural, view: usize, pixel: usize, margin: usize) 
 #[test]
 fn a_panel_without_texture_is_recovered_with_the_reward_or_smoothness_and_not_without_both() {
     let made = procedural::textureless_panel().only(&[1, 3, 4, 5, 7]);
-    // Nothing else may carry planes inwards: neither coarser scales, where the panel is small, nor other views, nor filling.
+    // Other ways to propagate planes inwards are off: coarser scales, on which the panel is small, other
+    // views, and filling.
     let scale = Scale { downscale: 1, food_sources: 3, first_iterations: 6, cycles: 16, cycle_iterations: 1 };
     let alone = changed(options(), |o| {
         o.schedule.scales = vec![scale];
@@ -289,7 +290,7 @@ fn another_seed_gives_other_bits() {
 }
 
 #[test]
-fn the_hook_follows_the_run_and_stops_it_in_every_phase() {
+fn the_progress_function_is_called_and_can_cancel_in_every_phase() {
     let scene = procedural::plane_and_sphere().only(&[3, 4, 5]).scene();
     let seen = Mutex::new(Vec::new());
     let watch = |progress: &Progress| {
@@ -310,7 +311,7 @@ fn the_hook_follows_the_run_and_stops_it_in_every_phase() {
     }
 }
 
-/// A run without any validated pixel or point, that says why.
+/// Asserts that a run has no validated pixel or point, and a reason for every pixel.
 fn assert_ends_with_reasons(made: &Procedural) {
     for options in [
         options(),
@@ -320,7 +321,7 @@ fn assert_ends_with_reasons(made: &Procedural) {
     ] {
         let result = run(made, &options);
         assert!(result.points.positions.is_empty());
-        assert!(!result.warnings.is_empty(), "nothing came out and nothing was said");
+        assert!(!result.warnings.is_empty(), "an empty result without a warning");
         for view in &result.views {
             let reasons = [
                 PixelStatus::NoSources,
@@ -336,12 +337,12 @@ fn assert_ends_with_reasons(made: &Procedural) {
 }
 
 #[test]
-fn two_views_run_to_an_end_and_say_why_nothing_is_validated() {
+fn two_views_finish_without_validated_pixels_and_with_reasons() {
     assert_ends_with_reasons(&procedural::plane_and_sphere().only(&[3, 4]));
 }
 
 #[test]
-fn two_views_are_enough_where_one_consistent_source_is() {
+fn two_views_suffice_if_one_consistent_source_does() {
     let made = procedural::plane_and_sphere().only(&[0, 1]);
     let mut options = changed(options(), |o| {
         o.check.min_consistent_views = 1;
@@ -356,8 +357,8 @@ fn two_views_are_enough_where_one_consistent_source_is() {
 }
 
 #[test]
-fn views_without_overlap_run_to_an_end_and_say_why_nothing_is_validated() {
-    // Four cameras back to back, each before its own wall.
+fn views_without_overlap_finish_without_validated_pixels_and_with_reasons() {
+    // Four cameras back to back, each in front of its own wall.
     let yaws = [0.0, 90.0, 180.0, 270.0];
     let outwards = |yaw: f64| DVec3::new(-yaw.to_radians().sin(), 0.0, yaw.to_radians().cos());
     let walls = yaws.map(|yaw| Surface {
@@ -380,7 +381,7 @@ fn masked_pixels_get_no_estimate_but_serve_other_views() {
     let is_masked = |pixel: usize| pixel % width < width / 2;
     let pixels = made.views[MIDDLE].camera.pixels();
     made.views[MIDDLE].mask = Some((0..pixels).map(|pixel| !is_masked(pixel)).collect());
-    // A mask that wants nothing.
+    // A mask that excludes every pixel.
     made.views[0].mask = Some(vec![false; pixels]);
     let result = run(&made, &options());
 

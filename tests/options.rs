@@ -1,4 +1,4 @@
-//! Options that no run can be made with are refused by name.
+//! Invalid options are refused by name.
 
 use skep::simd::SimdLevel;
 use skep::{Error, Options, Scale};
@@ -15,7 +15,7 @@ fn the_presets_are_in_order_and_found_by_name() {
     assert!(error.contains("quick") && error.contains("default, fast, paper"), "{error}");
 }
 
-/// What spoils an option, and the option's name and the value in the error.
+/// A change that makes an option invalid, and the option's name and the value in the error.
 type Spoiled = (fn(&mut Options), &'static str, &'static str);
 
 fn last_scale(options: &mut Options) -> &mut Scale {
@@ -65,7 +65,7 @@ fn an_option_out_of_range_is_named_with_its_value() {
         let mut options = Options::default();
         spoil(&mut options);
         let Err(Error::Argument { name, value, expected }) = options.check() else {
-            panic!("{option} {spoiled_value} is taken");
+            panic!("{option} {spoiled_value} is accepted");
         };
         assert_eq!((name, value.as_str()), (format!("options.{option}"), spoiled_value));
         assert!(!expected.is_empty());

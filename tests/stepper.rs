@@ -1,4 +1,4 @@
-//! A run taken apart: the same bits as the whole run, with estimates that travel as bytes, and maps of the host's own.
+//! Stepwise runs: the same bits as a whole run, estimates as bytes, and maps of the host.
 
 mod common;
 
@@ -151,7 +151,7 @@ fn maps_of_the_host_s_own_validate_and_guide_another_view() {
         ViewEstimate::from_maps(&stepper, 1, view, &own).unwrap()
     };
     let neighbors: Vec<ViewEstimate<Checked>> = (0..4).map(own).collect();
-    // Nothing is known of view 0 but what the others' maps propose and confirm.
+    // View 0 has no estimate: its planes come from the others' maps.
     let alone = stepper.search(1, 0, &[], None, &ignore_progress).unwrap();
     let others = [None, Some(&neighbors[1]), Some(&neighbors[2]), Some(&neighbors[3])];
     let guided = stepper.search(1, 0, &others, None, &ignore_progress).unwrap();
@@ -178,7 +178,7 @@ fn maps_of_the_host_s_own_validate_and_guide_another_view() {
 }
 
 #[test]
-fn what_does_not_belong_together_is_refused_by_name() {
+fn arguments_that_do_not_match_are_refused_by_name() {
     let stepper = Stepper::new(&scene(), &options()).unwrap();
     let first = run_cycle(&stepper, 0, &[], &InMemory);
     let message = |error: Error| error.to_string();

@@ -1,5 +1,5 @@
 /*
- * The kernels allocate nothing. The linker sends every call of malloc and the like here (--wrap). /
+ * The kernels allocate nothing. The linker redirects malloc and the like to this file (--wrap).
  */
 #include "support/check.h"
 #include "support/patches.h"

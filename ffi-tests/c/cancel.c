@@ -1,6 +1,6 @@
 /*
- * The callback stops any call at any moment, nothing is written then, and the same objects work
- * afterwards.
+ * The callback cancels any call at any time; then no output is written, and the same objects can be
+ * used again.
  */
 #define _POSIX_C_SOURCE 200809L
 #include "support/check.h"
@@ -34,7 +34,7 @@ static int32_t callback(void *user, const skep_progress *progress) {
     }
     ++self->calls;
     self->calls_after_stop += self->stopped;
-    /* Long enough for another thread to come in if it could. */
+    /* Long enough for a concurrent call to be noticed. */
     nanosleep(&(struct timespec){0, 200000}, NULL);
     if (!self->stopped && progress->done >= self->stop_at) {
         self->stopped = 1;
@@ -50,7 +50,7 @@ static double milliseconds_since(const struct timespec *from) {
     return (now.tv_sec - from->tv_sec) * 1e3 + (now.tv_nsec - from->tv_nsec) / 1e6;
 }
 
-/* What every call that was stopped has in common. */
+/* Checks that hold for every cancelled call. */
 static void check_stopped(const host *self, skep_status status, const char *what) {
     const double latency = self->stopped ? milliseconds_since(&self->stopped_at) : 0;
     printf("%s stopped at %g: %d calls, back after %.2f ms\n", what, self->stop_at, self->calls,
@@ -59,7 +59,7 @@ static void check_stopped(const host *self, skep_status status, const char *what
     CHECK(self->stopped == 1 && self->calls_after_stop == 0, "%s: %d calls after the stop", what,
           self->calls_after_stop);
     CHECK(atomic_load(&self->at_the_same_time) == 0, "%s", what);
-    /* Far more than the promise of 100 ms, which a busy machine may miss. */
+    /* Far above the documented 100 ms, which a busy machine may exceed. */
     CHECK(latency < 10000, "%s: %g ms", what, latency);
 }
 

@@ -162,7 +162,6 @@ static void check_ply(const char *folder, const skep_result *result) {
 
 /*
  * Maps of any numbers with gaps between rows, and a graph whose pixels have none, one or all views.
- * /
  */
 static void check_maps(const char *folder) {
     enum { WIDTH = 5, HEIGHT = 3, GAP = 2, PIXELS = WIDTH * HEIGHT };

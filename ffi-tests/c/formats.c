@@ -1,6 +1,5 @@
 /*
  * The same picture in every format, with gaps between rows, from any address, gives the same bits.
- * /
  */
 #include "support/check.h"
 #include "support/guarded.h"
@@ -30,7 +29,7 @@ static uint8_t gray_of(const uint8_t *rgb) {
 }
 
 /*
- * Writes a channel's value so that it rounds to `value`: `off` is how far from it, -0.49 to 0.49. /
+ * Writes a channel's value so that it rounds to `value`: `off` is the difference, -0.49 to 0.49.
  */
 static void put(uint8_t *place, uint32_t depth, uint8_t value, double off) {
     if (depth == SKEP_FORMAT_16) {
@@ -91,7 +90,6 @@ static skep_result *run_converted(const scene *made, const skep_options *options
 
 /*
  * Values at the ends: floats beyond 0 and 1 are clamped, 16-bit values are rounded to the nearest.
- * /
  */
 static void check_ends(void) {
     const float floats[] = {-1e30f,         -0.0f, 0,    1e-40f,   0.499f / 255,
@@ -99,7 +97,7 @@ static void check_ends(void) {
     const uint8_t expected[] = {0, 0, 0, 0, 0, 255, 255, 255, 255, 0};
     const uint16_t shorts[] = {0, 128, 129, 385, 386, 65535, 65407, 65406};
     const uint8_t rounded[] = {0, 0, 1, 1, 2, 255, 255, 254};
-    /* A fused cloud tells the colors that were stored. */
+    /* A fused cloud has the stored colors. */
     const skep_camera camera = {1, 1, 0, 0, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
     skep_options *options = NULL;
     REQUIRE(skep_options_create(NULL, &options));

@@ -1,6 +1,5 @@
 /*
  * Masks, depth ranges, source views, sparse points and options are honored, and can be asked for.
- * /
  */
 #include "support/check.h"
 #include "support/guarded.h"
@@ -81,7 +80,7 @@ static void check_mask(const scene *made, skep_scene *handed_in, const skep_opti
     skep_result_destroy(whole);
 }
 
-/* Views that are masked altogether are empty, and the run does not mind. */
+/* Views that are masked completely are empty, and the run succeeds. */
 static void check_all_masked(const scene *made, const skep_options *options) {
     skep_scene *handed_in = scene_hand_in(made);
     uint8_t *nothing = take(scene_pixels(made), 1);
@@ -100,7 +99,7 @@ static void check_all_masked(const scene *made, const skep_options *options) {
     skep_scene_destroy(handed_in);
 }
 
-/* A range before everything leaves no right depth; nothing is found outside of it. */
+/* A range in front of all surfaces gives no correct depth; no depth is outside of it. */
 static void check_range(const scene *made, skep_scene *handed_in, const skep_options *options) {
     REQUIRE(skep_scene_set_depth_range(handed_in, 0, 2, 2.5));
     double near_by = 0, far_away = 0;

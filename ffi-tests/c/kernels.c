@@ -26,7 +26,7 @@ typedef struct batch {
     size_t count;
 } batch;
 
-/* The homography takes a pixel where the point behind it projects. */
+/* The homography maps a pixel to the projection of its plane point. */
 static void check_homographies(const batch *work) {
     const skep_camera *from = &work->made->photographs[0].camera,
                       *to = &work->made->photographs[1].camera;
@@ -80,7 +80,7 @@ static void check_correlations(const batch *work) {
     CHECK(scene_is_small() || (double)better > 0.9 * pairs, "%zu of %g", better, pairs);
 }
 
-/* A patch fits itself, its negative is its opposite, and what has no texture fits nothing. */
+/* The NCC of a patch is 1 with itself and -1 with its negative; without texture it is -1. */
 static void check_known_values(void) {
     enum { SIDE = 21 };
     static uint8_t gray[3][SIDE * SIDE];

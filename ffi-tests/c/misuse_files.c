@@ -163,7 +163,7 @@ static void check_maps(const char *folder) {
         FAILS(read_map(kind, folder), SKEP_ERR_FILE, "cannot be read");
         FAILS(read_map(kind, ""), SKEP_ERR_FILE, "cannot be read");
     }
-    /* A header that announces more than any memory holds is believed only by who has as much. */
+    /* No header makes the reader allocate: a huge map is limited by the caller's buffers alone. */
     write_bytes(cut, "4000000000&1000000&1&", 21);
     size_t total = 9;
     REQUIRE(skep_read_consistency_graph(cut, NULL, 0, NULL, 0, &width, &height, &total));
@@ -219,7 +219,7 @@ static void check_scene_folder(const char *folder, const skep_scene *handed_in) 
     skep_scene_destroy(read);
 }
 
-/* Folders that are files, and names that would lead out of a folder. */
+/* Folders that are files, and names that lead outside a folder. */
 static void check_places(const char *folder, const scene *made, const skep_result *result,
                          const skep_scene *handed_in, const skep_cloud *cloud) {
     static const char *const NAMES[] = {"../up.png", "/absolute.png", "a/../../b.png", "",

@@ -1,6 +1,5 @@
 /*
  * Errors of runs, results, clouds and fusion: the status, the argument's name, and nothing written.
- * /
  */
 #include "support/check.h"
 #include "support/results.h"

@@ -10,7 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Texts that an option does not take are refused with its name, and leave its value. */
+/* Invalid texts of an option are refused with its name, and its value is kept. */
 static void check_option_texts(skep_options *options) {
     static const char *const TEXTS[][2] = {
         {"seed", "-1"},
@@ -304,8 +304,7 @@ static void check_questions(skep_scene *handed_in) {
 }
 
 /*
- * What only a whole scene can tell: too few views, no ranges, lists that name views there are not.
- * /
+ * Errors that only a complete scene has: too few views, no ranges, lists with indices of no view.
  */
 static void check_whole_scenes(const scene *made, skep_scene *handed_in) {
     const uint32_t lists[][2] = {{1, 1}, {0, 1}, {1, 2}, {UINT32_MAX, 1}};

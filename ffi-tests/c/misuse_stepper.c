@@ -1,6 +1,6 @@
 /*
- * Errors of stepper: what does not belong together is refused by name, and the stepper go on
- * working. /
+ * Errors of steppers: arguments that do not match are refused by name, and the steppers can be used
+ * again.
  */
 #include "support/check.h"
 #include "support/results.h"
@@ -109,7 +109,7 @@ static void check_order(const stage *at) {
           SKEP_ERR_ARGUMENT, "estimates[0] is checked");
     FAILS(skep_stepper_upsample(stepper, at->last, 0, searched[0], OUT(skep_estimate *, 0)),
           SKEP_ERR_ARGUMENT, "estimate is searched");
-    /* A check and an end need the view's own estimate, and full size. */
+    /* A check and a finish need the view's own estimate; a finish needs full size. */
     FAILS(skep_stepper_check(stepper, 0, 0, NULL, 0, OUT(skep_estimate *, 0)), SKEP_ERR_ARGUMENT,
           "estimates[0] is none");
     FAILS(skep_stepper_finish(stepper, 0, NULL, 0, NULL, NULL, OUT(skep_result *, 0)),
@@ -129,7 +129,7 @@ static void check_order(const stage *at) {
           SKEP_ERR_ARGUMENT, "cycle is 99");
     FAILS(skep_stepper_upsample(stepper, at->last, 99, coarse[0], OUT(skep_estimate *, 0)),
           SKEP_ERR_ARGUMENT, "view is 99");
-    /* Candidates are to one view, for one cycle. */
+    /* Candidates are for one view and one cycle. */
     skep_candidates *candidates = NULL;
     REQUIRE(skep_stepper_propagate(stepper, 1, 0, coarse, views, &candidates));
     FAILS(skep_stepper_search(stepper, 1, 1, coarse, views, candidates, NULL, NULL,
@@ -220,7 +220,7 @@ void test_misuse_stepper(const char *folder) {
     check_order(&at);
     check_null(&at);
     check_foreign(&at, options);
-    /* After all that was refused, the stepper go on. */
+    /* After all the errors, the steppers can be used again. */
     skep_estimate *next = NULL;
     REQUIRE(skep_stepper_search(at.stepper, at.last, 0, (estimate_list)at.fine, made.views, NULL,
                                 NULL, NULL, &next));

@@ -1,6 +1,6 @@
 /*
- * A host's own maps become estimates: they guide searches, are checked against, and finish as they
- * are.
+ * Estimates from a host's maps: searches start from them, checks compare with them, and they can be
+ * finished unchanged.
  */
 #include "support/check.h"
 #include "support/results.h"
@@ -20,7 +20,7 @@ static skep_estimate *true_estimate(const scene *made, const skep_stepper *stepp
     return estimate;
 }
 
-/* What goes in comes out, with masks of validity, costs, and rows apart. */
+/* Maps are returned unchanged, with validity masks, costs, and gaps between rows. */
 static void check_round_trip(const scene *made, const skep_stepper *stepper, uint32_t cycle) {
     const size_t pixels = scene_pixels(made), width = made->width, stride = width + 2;
     const photograph *truth = &made->photographs[2];
@@ -80,7 +80,7 @@ static size_t right(const photograph *truth, const float *depth, size_t pixels) 
     return count;
 }
 
-/* A view with no planes of its own takes those that are transferred from the others' true maps. */
+/* A view without planes of its own gets those transferred from the others' true maps. */
 static void check_guidance(const scene *made, const skep_stepper *stepper, uint32_t cycle,
                            skep_estimate **estimates) {
     const size_t pixels = scene_pixels(made);
@@ -121,7 +121,7 @@ static void check_guidance(const scene *made, const skep_stepper *stepper, uint3
     free(nothing);
 }
 
-/* Finished as they are, true maps match well and are all validated. */
+/* Finished unchanged, true maps have low costs and are all validated. */
 static void check_finished(const scene *made, const skep_stepper *stepper,
                            skep_estimate **estimates) {
     const size_t pixels = scene_pixels(made);
@@ -184,7 +184,7 @@ void test_own_maps(const char *folder) {
     REQUIRE(skep_stepper_create(handed_in, options, &stepper));
     REQUIRE(skep_stepper_get_count(stepper, &count, NULL));
     check_averaged(&made, handed_in, options);
-    /* Stepper need neither scene nor options any more. */
+    /* Steppers need neither scene nor options any more. */
     skep_options_destroy(options);
     skep_scene_destroy(handed_in);
     const uint32_t last = count - 1;

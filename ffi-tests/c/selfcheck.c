@@ -1,4 +1,4 @@
-/* selfcheck ERROR: makes an error on purpose, which the sanitizers or valgrind have to report. */
+/* selfcheck ERROR: makes an intentional error, which the sanitizers or valgrind must report. */
 #include <skep.h>
 
 #include <limits.h>

@@ -1,6 +1,6 @@
 /*
- * A run taken cycle by cycle gives the same bits as a whole one, in any order of the views, and
- * across saved estimates.
+ * A stepwise run gives the same bits as a whole one, in any order of the views, and across saved
+ * estimates.
  */
 #include "support/check.h"
 #include "support/results.h"
@@ -162,7 +162,7 @@ static void check_stepper_themselves(const scene *made, const skep_scene *handed
                                      const skep_options *options, const skep_stepper *stepper) {
     uint32_t count = 0, views = 0;
     REQUIRE(skep_stepper_get_count(stepper, &count, &views));
-    CHECK(count == 4 && views == made->views, "%u stepper of %u views", (unsigned)count,
+    CHECK(count == 4 && views == made->views, "%u cycles of %u views", (unsigned)count,
           (unsigned)views);
     REQUIRE(skep_stepper_get_count(stepper, NULL, NULL));
     for (uint32_t cycle = 0; cycle < count; ++cycle) {

@@ -1,6 +1,6 @@
 /*
- * Several threads at once: with objects of their own and with the same ones, with calls that fail
- * in between.
+ * Several threads at once: with objects of their own and with shared ones, with failing calls in
+ * between.
  */
 #define _POSIX_C_SOURCE 200809L
 #include "support/check.h"

@@ -1,6 +1,5 @@
 /*
- * A whole run finds what is there, and hands out maps, counts and points that agree with each
- * other.
+ * A whole run gives correct depths, and maps, counts and points that are consistent.
  */
 #include "support/check.h"
 #include "support/guarded.h"
@@ -86,7 +85,7 @@ static void check_agreement(const skep_camera *camera, const view_maps *maps) {
           (unsigned long long)maps->statistics.ncc_evaluations);
     CHECK(maps->statistics.bilinear_samples > maps->statistics.ncc_evaluations,
           "patches have several samples");
-    CHECK(maps->statistics.early_terminations > 0, "some hypotheses are given up early");
+    CHECK(maps->statistics.early_terminations > 0, "some hypotheses are rejected early");
     CHECK(maps->cycle_total >= 2, "%zu", maps->cycle_total);
     for (size_t i = 0; i < maps->cycle_total; ++i) {
         const skep_cycle_record *cycle = &maps->cycles[i];
@@ -96,13 +95,13 @@ static void check_agreement(const skep_camera *camera, const view_maps *maps) {
               "cycle %zu", i);
     }
     const skep_cycle_record *last = &maps->cycles[maps->cycle_total - 1];
-    /* Closing what is left open makes validated pixels, and finishing takes none away. */
+    /* Gap filling adds validated pixels, and finishing removes none. */
     CHECK(last->downscale == 1 && last->validated <= counts[SKEP_PIXEL_VALIDATED],
           "the last cycle's check found %llu, the map has %llu",
           (unsigned long long)last->validated, (unsigned long long)counts[SKEP_PIXEL_VALIDATED]);
 }
 
-/* Every way to get a map gives the same values, and leaves alone what lies between rows. */
+/* Every way to get a map gives the same values, and does not write between rows. */
 static void check_strides(const skep_result *result, uint32_t view, const view_maps *maps) {
     const size_t width = maps->width, height = maps->height;
     const size_t sizes[] = {4, 12, 4, 1, 2, 4};
@@ -156,7 +155,6 @@ static void check_strides(const skep_result *result, uint32_t view, const view_m
 
 /*
  * Points lie on the surfaces, their views see them, and their colors are those of the photographs.
- * /
  */
 static void check_cloud(const scene *made, const skep_result *result) {
     points cloud = points_of_result(result);
@@ -259,7 +257,7 @@ void test_whole(const char *folder) {
     }
     check_cloud(&made, result);
 
-    /* A cloud outlives its result, and a result what it was made from. */
+    /* A cloud outlives its result, and a result its scene and options. */
     skep_cloud *cloud = NULL;
     REQUIRE(skep_result_get_cloud(result, &cloud));
     const points before = points_of_result(result);

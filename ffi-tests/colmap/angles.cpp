@@ -1,5 +1,5 @@
-// What COLMAP's multi-view stereo makes of our workspace before it looks at a map: the order of the
-// images, which of them overlap, and their triangulation angles.
+// COLMAP's multi-view stereo on our workspace before it reads a map: order of the images, overlaps,
+// and triangulation angles.
 #include "colmap.hpp"
 
 #include <base/triangulation.h>
@@ -72,7 +72,7 @@ void the_same_views_overlap(const skep_scene *scene, const colmap::mvs::Model &m
 }
 
 // Both take the angle of rank round(0.75 (n - 1)) of n, so that no number of points makes a
-// difference. COLMAP's model reckons in floats.
+// difference. COLMAP's model computes in floats.
 void angles_agree(const scene::Scene &made, const skep_scene *scene,
                   const colmap::mvs::Model &model) {
     std::printf("triangulation angles\n");
@@ -116,8 +116,8 @@ void ranks_agree(const scene::Scene &made) {
     }
 }
 
-// Views that look at a surface from opposite sides see nothing in common: theirs is the only large
-// angle, which COLMAP folds back to a small one.
+// Views on opposite sides of a surface have no overlap; only they have large angles, which COLMAP
+// folds to small ones.
 void obtuse_angles_stay_obtuse(const scene::Scene &made) {
     std::printf("views that face each other\n");
     scene::Scene facing = made;

@@ -1,5 +1,4 @@
-// What the tests assert with. A test goes on after a failure and its process ends with the number
-// of them.
+// Assertions. A test continues after a failure, and the exit status is the number of failures.
 #pragma once
 
 #include <skep.h>
@@ -21,7 +20,7 @@ inline void expect(bool holds, const char *what, const char *file, int line)
     }
 }
 
-// Prints what was measured, so that a log shows how far from the bound it is.
+// Prints the measured value, so that a log has its distance from the bound.
 inline void expect_at_most(double measured, double bound, const char *what)
 {
     std::printf("  %-72s %.4g (at most %.4g)\n", what, measured, bound);
@@ -45,7 +44,7 @@ inline std::string last_error()
     return text.c_str();
 }
 
-// For calls that must succeed if the test is to go on.
+// For calls without whose success the test cannot continue.
 inline void must(skep_status status)
 {
     if (status != SKEP_OK) {

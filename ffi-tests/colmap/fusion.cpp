@@ -26,7 +26,7 @@ Cloud our_cloud(const skep_cloud *cloud) {
 
 Cloud fuse_with_colmap(const std::string &folder, const colmap::mvs::StereoFusionOptions &options) {
     colmap::mvs::StereoFusion fusion(options, folder, "COLMAP", "", "geometric");
-    // It tells its user much about itself, and us nothing new.
+    // Its log is long and not used here.
     std::cout.setstate(std::ios::failbit);
     fusion.Start();
     fusion.Wait();
@@ -82,8 +82,8 @@ Spread to_surface(const Cloud &points) {
     return spread_of(distances);
 }
 
-// The workspace with a model that says what COLMAP's fusion, which puts pixel centers at whole
-// numbers, takes it to say.
+// The workspace with a model shifted by half a pixel, as COLMAP's fusion puts pixel centers at
+// integers.
 std::string with_whole_pixels(const std::string &folder) {
     const std::string moved = scene::empty_folder("fusion-whole-pixels");
     for (const char *part : {"/images", "/stereo"}) {
@@ -151,9 +151,9 @@ int main() {
         const Bounds coarse = {0.12, 1, {0.008, 0.025}, {0.002, 0.012}};
         compare("COLMAP's settings", ours, fuse_with_colmap(workspace.folder, defaults), coarse);
 
-        // With settings that mean what ours do the clouds differ by little more than the half pixel
-        // by which its fusion is off: it puts the centers of pixels at whole numbers, against
-        // COLMAP's own convention.
+        // With settings equivalent to ours the clouds differ by little more than the half pixel by
+        // which its fusion is off: it puts the centers of pixels at whole numbers, against COLMAP's
+        // own convention.
         colmap::mvs::StereoFusionOptions like_ours = defaults;
         like_ours.min_num_pixels = 4;
         like_ours.max_normal_error = 30;
@@ -161,7 +161,7 @@ int main() {
         const Bounds fine = {0.6, 1.1, {0.005, 0.01}, {0.002, 0.012}};
         compare("settings like ours", ours, fuse_with_colmap(workspace.folder, like_ours), fine);
 
-        // With a model that makes up for it, its cloud is as near to the surface as ours.
+        // With a model that compensates for it, its cloud is as near to the surface as ours.
         const std::string moved = with_whole_pixels(workspace.folder);
         const Bounds finest = {0.6, 1.1, {0.0025, 0.008}, {1.2 * surface.half, 1.2 * surface.most}};
         compare("settings like ours, whole pixels", ours, fuse_with_colmap(moved, like_ours),

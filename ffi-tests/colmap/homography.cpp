@@ -16,7 +16,7 @@ using check::Owned;
 using Matrix = Eigen::Matrix3d;
 using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-// What takes the library's pixels to COLMAP's.
+// Maps the library's pixels to COLMAP's.
 Matrix half_a_pixel() {
     Matrix shift = Matrix::Identity();
     shift(0, 2) = shift(1, 2) = half_pixel;
@@ -143,8 +143,9 @@ std::vector<float> correlate(const Gray &reference, const Gray &source,
     return correlation;
 }
 
-// A patch and its image by a homography correlate as the patch and what lies at the same place in
-// the image that COLMAP warped by that homography; but that image is rounded to whole gray values.
+// The correlation of a patch with its image by a homography equals that with the same pixels of the
+// image that COLMAP warped by this homography, up to the rounding of that image to whole gray
+// values.
 void warps_agree() {
     const scene::Scene made = scene::make();
     const scene::View &reference = made.views[0];

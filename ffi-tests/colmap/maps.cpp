@@ -51,7 +51,7 @@ Graph graph_of(const colmap::mvs::ConsistencyGraph &graph, uint32_t width, uint3
     return views;
 }
 
-// What the result says each pixel was matched with; nothing where it has no depth.
+// The source views that each pixel was matched with; none where it has no depth.
 Graph graph_of(const skep_result *result, uint32_t view, const std::vector<float> &depth) {
     uint32_t sources[32];
     size_t count = 0;
@@ -132,8 +132,7 @@ void maps_are_the_same_both_ways(uint32_t width, uint32_t height) {
     const size_t pixels = size_t{width} * height;
     std::mt19937 random(width);
     std::uniform_real_distribution<float> any(0, 10);
-    // Among them what is easily lost on the way: empty pixels and numbers next to 0 and to
-    // infinity.
+    // Including special values: empty pixels and numbers next to 0 and to infinity.
     std::vector<float> depth(pixels), normal(3 * pixels);
     for (size_t pixel = 0; pixel < pixels; ++pixel) {
         const float odd[] = {0, std::numeric_limits<float>::denorm_min(),

@@ -61,7 +61,7 @@ double camera_difference(const skep_scene *scene, const colmap::Reconstruction &
     return largest;
 }
 
-// Positions with the names of the images that saw them: what a model says of points, whatever its
+// Positions with the names of the images that saw them: the points of a model, independent of its
 // ids.
 std::map<std::array<double, 3>, std::set<std::string>>
 points_of(const colmap::Reconstruction &model)
@@ -77,7 +77,7 @@ points_of(const colmap::Reconstruction &model)
     return points;
 }
 
-// COLMAP finds in our model what was put into the scene, to the bit where the layout can hold it.
+// COLMAP reads the scene from our model, bit for bit where the layout allows it.
 void colmap_reads_our_model(const scene::Scene &made, const std::string &folder)
 {
     std::printf("COLMAP reads our model\n");

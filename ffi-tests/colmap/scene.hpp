@@ -1,4 +1,4 @@
-// A scene made in code, whose surfaces are known exactly, and what the library makes of it.
+// A synthetic scene with exact surfaces, and the library's result.
 #pragma once
 
 #include "check.hpp"

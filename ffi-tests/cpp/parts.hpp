@@ -6,7 +6,7 @@
 #include <skep.hpp>
 #include <string>
 
-/// The wall seen by five cameras.
+/// The wall in five views.
 skep::Scene made_scene();
 /// Options for a run of a fraction of a second.
 skep::Options quick_options();

@@ -1,4 +1,4 @@
-// Runs taken apart, estimates, and fusion.
+// Stepwise runs, estimates, and fusion.
 #include "parts.hpp"
 #include "test.hpp"
 
@@ -95,8 +95,7 @@ void test_estimates() {
     CHECK(loaded.depth == maps.depth && loaded.normal == maps.normal && loaded.cost == maps.cost);
     FAILS(SKEP_ERR_ARGUMENT, "bytes", stepper.load({bytes.data(), bytes.size() - 1}));
 
-    // From maps: what is given is there, and what has a depth counts as validated unless told
-    // otherwise.
+    // From maps: they are returned unchanged, and pixels with a depth are validated by default.
     const skep::Size size = MUST(stepper.size(0, 2));
     skep::Map<float> depth(size), normal(size, 3);
     depth.at(3, 2) = 5, normal.at(3, 2, 2) = -1;

@@ -1,5 +1,4 @@
-// What the tests of skep.hpp share: checks, and words that read the same with and without
-// exceptions.
+// Helpers of the tests of skep.hpp: checks and macros that work with and without exceptions.
 #pragma once
 
 #include <skep.hpp>

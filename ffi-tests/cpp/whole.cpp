@@ -42,7 +42,7 @@ void test_spans() {
     for (int element : skep::Span<const int>(vector))
         sum += element;
     CHECK(sum == 9 && skep::Span<int>().empty());
-    // Nothing that is only to be read becomes something to be written to.
+    // A map of constant values does not convert to a writable one.
     static_assert(!std::is_constructible_v<skep::Span<int>, const std::vector<int> &>);
     static_assert(!std::is_constructible_v<skep::Span<double>, std::vector<int> &>);
 }
@@ -205,7 +205,7 @@ void test_progress() {
     };
     CHECK(MUST(skep::reconstruct(scene, options, watch)) && calls > 0);
 #ifndef SKEP_NO_EXCEPTIONS
-    // The exception goes through the library to whom called it, once, and the run ends early.
+    // The exception passes through the library to the caller, once, and the run ends early.
     struct OwnException : std::runtime_error {
         using std::runtime_error::runtime_error;
     };
@@ -219,7 +219,7 @@ void test_progress() {
     } catch (const OwnException &exception) {
         CHECK(std::string(exception.what()) == "enough" && thrown == 1);
     }
-    // At the end too, when the result is there already.
+    // Also at the end, when the result exists already.
     try {
         skep::reconstruct(scene, options, [](const skep::Progress &progress) {
             if (progress.done >= 1)

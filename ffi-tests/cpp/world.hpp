@@ -1,5 +1,5 @@
-// A small world made in code: cameras in a row before a slanted wall with texture, of which
-// everything is known.
+// A synthetic scene: cameras in a row in front of a slanted textured wall, with exact depths and
+// normals.
 #pragma once
 
 #include <array>
@@ -78,7 +78,7 @@ inline Vector normal(const skep_camera &camera) {
     return out;
 }
 
-/// What a camera sees, 8 bits a pixel.
+/// The image of a camera, 8 bits a pixel.
 inline std::vector<std::uint8_t> picture(const skep_camera &camera, std::uint32_t width,
                                          std::uint32_t height) {
     const Vector from = center(camera);
@@ -97,7 +97,7 @@ inline std::vector<std::uint8_t> picture(const skep_camera &camera, std::uint32_
     return out;
 }
 
-/// Where the cameras stand.
+/// Positions of the cameras.
 constexpr std::array<double, 5> places = {0.0, 0.8, -0.8, 1.4, -1.4};
 constexpr std::uint32_t width = 56, height = 42;
 

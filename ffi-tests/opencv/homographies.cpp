@@ -109,7 +109,7 @@ static void test_against_warp() {
                 "without warping %.2f (%d pixels)\n",
                 from_exact / inside, most, from_truth / inside, unwarped / inside, inside);
     CHECK(inside > width * height / 2);
-    // What the source saw, warped into the reference, is what the reference saw.
+    // The source image, warped into the reference, is the reference image.
     CHECK(from_truth / inside < 1.5 && unwarped / inside > 10 * from_truth / inside);
 }
 

@@ -1,5 +1,4 @@
-// What the tests against OpenCV share: pictures made in code, and their exact arithmetic in
-// doubles.
+// Helpers of the tests against OpenCV: synthetic pictures, and exact arithmetic on them in doubles.
 #pragma once
 
 #include "../cpp/test.hpp"
@@ -21,7 +20,7 @@ inline cv::Mat texture(int width, int height, double smoothness, std::uint64_t s
     return out;
 }
 
-/// Where a homography takes a pixel.
+/// The image of a pixel by a homography.
 inline cv::Point2d apply(const skep::Homography &h, double x, double y) {
     const double z = h[6] * x + h[7] * y + h[8];
     return {(h[0] * x + h[1] * y + h[2]) / z, (h[3] * x + h[4] * y + h[5]) / z};

@@ -37,8 +37,8 @@ struct Hit {
     double depth = infinity, gray = 0;
 };
 
-/// What a ray meets first, from (x, 0, 0) towards (a, b, 1): a back wall, a floor, a slanted board
-/// and two balls.
+/// The first intersection of a ray, from (x, 0, 0) towards (a, b, 1): a back wall, a floor, a
+/// slanted board and two balls.
 static Hit cast(double x, double a, double b) {
     Hit hit;
     const auto plane = [&](int surface, cv::Vec3d normal, double offset, auto inside) {
@@ -143,8 +143,8 @@ static std::array<cv::Mat, 2> our_disparities(const cv::Mat &left, const cv::Mat
     skep::Options options;
     options.set("min_consistent_views", 1); // a pair has one source
     options.set("fusion.min_views", 1);
-    // Near disparity 10 the default tolerance of 1 % is a tenth of a pixel; that much two views are
-    // not sure of.
+    // Near disparity 10 the default tolerance of 1 % is a tenth of a pixel; two views are not that
+    // accurate.
     options.set("check.depth_tolerance", 0.02);
     // A pair has no other views to correct edges: the smaller the window, the fewer of its samples
     // lie beyond them.

@@ -74,8 +74,7 @@ static void compare(int hypotheses, int step) {
     const skep::NccWindow window =
         skep::NccWindow::create(radius, std::uint32_t(step), alike, alike);
     std::vector<float> ours(patches), theirs(patches);
-    // The best of rounds that take turns: what else the machine does slows single rounds of either
-    // side.
+    // The best of alternating rounds: other load on the machine slows single rounds of either side.
     double our_best = 1e9, their_best = 1e9;
     for (int round = 0; round < rounds; ++round) {
         our_best = std::min(our_best, seconds([&] {

@@ -1,4 +1,4 @@
-"""A world made in code with known depths and normals: a textured ball before a tilted, textured wall."""
+"""A synthetic scene with exact depths and normals: a textured ball in front of a tilted, textured wall."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ except KeyboardInterrupt:
     assert signal.getsignal(signal.SIGINT) is before
     assert threading.active_count() == 1
     print("interrupted", flush=True)
-# The interpreter and the library go on.
+# The interpreter and the library still work.
 assert len(skep.Scene()) == 0
 """
 
@@ -98,14 +98,14 @@ def test_ctrl_c_stops_a_run_at_once(way):
 
 
 def wait_until_it_works(process: int) -> None:
-    """Until the library's threads are at it: Python, the call, and the threads of the search."""
+    """Waits until the library's threads work: Python, the call, and the threads of the search."""
     while len(os.listdir(f"/proc/{process}/task")) < 4:
         time.sleep(0.01)
     time.sleep(0.3)
 
 
 def test_a_signal_handler_runs_while_the_library_works(scene):
-    """Handlers that raise stop the run; those that do not are heard, and the run goes on."""
+    """Handlers that raise cancel the run; others are called, and the run continues."""
     heard = []
 
     class Alarm(Exception):

@@ -1,4 +1,4 @@
-"""skep and pycolmap: reconstructions in, workspaces out, without losing half a pixel between them."""
+"""skep and pycolmap: reconstructions are read and workspaces written without a shift of half a pixel."""
 
 import os
 

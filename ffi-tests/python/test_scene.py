@@ -1,4 +1,4 @@
-"""Scenes and options: what they keep, and what they refuse."""
+"""Scenes and options: stored values and errors."""
 
 import made
 import numpy as np

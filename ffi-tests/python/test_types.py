@@ -1,4 +1,4 @@
-"""The package is typed, for its users and in itself."""
+"""The package is typed: its interface and its own code."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Whole runs: what they find, and how it is handed out."""
+"""Whole runs: results and their lifetimes."""
 
 import gc
 
@@ -66,7 +66,7 @@ def test_an_array_outlives_the_result():
     row = depth[10]
     del found, depth
     gc.collect()
-    # What would be reused if it had been freed.
+    # Memory that would be reused if it had been freed.
     others = [np.full(expected.shape, 7, dtype=np.float32) for _ in range(100)]
     assert np.array_equal(row, expected[10]) and len(others) == 100
 

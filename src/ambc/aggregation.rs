@@ -12,8 +12,8 @@ pub const MAX_BEST_VIEWS: usize = 8;
 pub struct GroupCosts {
     /// Its projections into the views.
     pub projections: Projections,
-    /// Lower bound of its cost in each view that has it in its image: the geometric term, and the photometric one as soon
-    /// as it is known.
+    /// Lower bound of its cost in each view that has it in its image: the geometric term, and the photometric
+    /// one as soon as it is known.
     pub costs: [f32; LANES],
 }
 
@@ -23,7 +23,8 @@ pub fn count_visible(groups: &[GroupCosts]) -> usize {
     groups.iter().map(|group| group.projections.inside.count_ones() as usize).sum()
 }
 
-/// The rank of a view: the number of views in which the hypothesis costs less; of equal costs the earlier is lower.
+/// The rank of a view: the number of views in which the hypothesis costs less; of equal costs the earlier is
+/// lower.
 #[inline(always)]
 pub fn rank_of<S: Simd>(simd: S, groups: &[GroupCosts], group: usize, lane: usize) -> usize {
     let cost = simd.splat(groups[group].costs[lane]);

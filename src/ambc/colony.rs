@@ -15,8 +15,8 @@ pub struct Candidate {
     pub cost: f32,
 }
 
-/// The colonies of one color of the checkerboard. While one color is searched, the other is only read: the result does
-/// not depend on the order of the pixels.
+/// The colonies of one color of the checkerboard. While one color is searched, the other is only read: the
+/// result does not depend on the order of the pixels.
 #[derive(Debug, Clone)]
 pub struct Colonies {
     /// The pixels of the image.

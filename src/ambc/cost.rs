@@ -5,8 +5,8 @@
 //! cost           = mean of the k smallest costs over the view set, or their sum / (|S| - 1) with k = 0
 //! ```
 //!
-//! with `e` the relative depth error against the view's validated surface, or the assumed error where there is none. A view
-//! whose image the hypothesis leaves does not count.
+//! with `e` the relative depth error against the view's validated surface, or the assumed error where there
+//! is none. A view whose image the hypothesis leaves does not count.
 
 use super::aggregation::{GroupCosts, count_visible, rank_of, sum, sum_of_best};
 use super::colony::Colonies;
@@ -135,12 +135,12 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         self.is_textureless
     }
 
-    /// The cost of a hypothesis if it is below `bound`, else infinity: costs are not negative, so the sum over views ends as
-    /// soon as it cannot stay below.
+    /// The cost of a hypothesis if it is below `bound`, else infinity: costs are not negative, so the sum
+    /// over views ends as soon as it cannot stay below.
     #[inline(always)]
     pub fn cost(&mut self, food: &FoodSource, bound: f32) -> f32 {
-        // A function of its own, also within what is compiled for the instruction set already: it is long, and called from
-        // many places.
+        // A function of its own, also within what is compiled for the instruction set already: it is long,
+        // and called from many places.
         let cost = self.simd.vectorize(
             #[inline(always)]
             || {
@@ -154,7 +154,8 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         if cost < bound { cost } else { f32::INFINITY }
     }
 
-    /// Replaces a food source by `trial` if that is better, smoothness included; `reward` is a bonus on the trial's fitness.
+    /// Replaces a food source by `trial` if that is better, smoothness included; `reward` is a bonus on the
+    /// trial's fitness.
     #[inline(always)]
     pub fn replace_if_better(&mut self, food: &mut FoodSource, trial: &FoodSource, reward: f32) -> bool {
         let bound =
@@ -199,8 +200,9 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         if count == 0 { MAX_COST } else { sum / count as f32 }
     }
 
-    /// Keeps only `count` views for the hypotheses to come, writes them to `set` and returns the cost of this one: the views
-    /// whose validated surfaces agree best with it or, where too few do, those in which it costs least.
+    /// Keeps only `count` views for the hypotheses to come, writes them to `set` and returns the cost of this
+    /// one: the views whose validated surfaces agree best with it or, where too few do, those in which it
+    /// costs least.
     #[inline(always)]
     pub fn keep_best_views(&mut self, food: &FoodSource, count: usize, set: &mut [u32]) -> f32 {
         let is_matched = self.rank_views(food, count);
@@ -215,8 +217,8 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         self.cost(food, f32::INFINITY)
     }
 
-    /// Finds the costs by which the views are ranked: the geometric ones where surfaces of at least `count` views agree, else
-    /// with the photometric ones. Returns whether the photometric costs were computed.
+    /// Finds the costs by which the views are ranked: the geometric ones where surfaces of at least `count`
+    /// views agree, else with the photometric ones. Returns whether the photometric costs were computed.
     #[inline(always)]
     fn rank_views(&mut self, food: &FoodSource, count: usize) -> bool {
         self.project(food);
@@ -305,7 +307,8 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         );
     }
 
-    /// Equation 3 of the paper: the sum over all views, divided by one less than their number; a small set costs more.
+    /// Equation 3 of the paper: the sum over all views, divided by one less than their number; a small set
+    /// costs more.
     #[inline(always)]
     fn cost_over_all_views(&mut self, food: &FoodSource, bound: f32) -> f32 {
         let count = count_visible(&self.groups);

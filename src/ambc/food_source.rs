@@ -6,8 +6,8 @@ use crate::geometry::{MIN_FACING, PlaneHypothesis, SlantedPlane};
 use crate::matching::Problem;
 use glam::Vec3;
 
-/// A plane at a pixel and what it costs there. It is stored as depth at its pixel and normal: the same plane at another
-/// pixel is a transfer, and clamping to the depth range is exact.
+/// A plane at a pixel and what it costs there. It is stored as depth at its pixel and normal: the same plane
+/// at another pixel is a transfer, and clamping to the depth range is exact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FoodSource {
     /// Depth at the pixel.
@@ -29,8 +29,8 @@ impl FoodSource {
         FoodSource { depth, normal, cost: f32::INFINITY, trials: 0, validated: false }
     }
 
-    /// A random plane: uniform in inverse depth within the given part (0 to 1) of the range, and over the visible
-    /// hemisphere (section 5.1 of the paper).
+    /// A random plane: uniform in inverse depth within the given part (0 to 1) of the range, and over the
+    /// visible hemisphere (section 5.1 of the paper).
     #[inline(always)]
     pub fn random(problem: &Problem, ray: Vec3, random: &mut Random, part: (f32, f32)) -> FoodSource {
         let share = part.0 + (part.1 - part.0) * random.unit();
@@ -56,7 +56,8 @@ impl FoodSource {
         FoodSource::new(depth, if is_facing { normal } else { self.normal })
     }
 
-    /// The food source of a plane about the pixel with this ray, not evaluated yet; `None` where it is not usable.
+    /// The food source of a plane about the pixel with this ray, not evaluated yet; `None` where it is not
+    /// usable.
     #[inline(always)]
     pub fn of_plane(problem: &Problem, ray: Vec3, plane: &SlantedPlane) -> Option<FoodSource> {
         let (depth, normal) = plane.depth_and_normal(ray, problem.inverse_focal);
@@ -91,8 +92,8 @@ pub fn fitness(cost: f32) -> f32 {
     1.0 / (1.0 + cost)
 }
 
-/// The cost under which a food source with a fitness bonus `reward` beats one of this cost. The reward counts in this
-/// comparison only and is never stored (section 5.6 of the paper).
+/// The cost under which a food source with a fitness bonus `reward` beats one of this cost. The reward counts
+/// in this comparison only and is never stored (section 5.6 of the paper).
 #[inline(always)]
 pub fn cost_to_beat(cost: f32, reward: f32) -> f32 {
     let needed = fitness(cost) - reward;

@@ -1,4 +1,5 @@
-//! The food sources a colony starts with (section 5.1 of the paper), and the view set its pixel is matched with.
+//! The food sources a colony starts with (section 5.1 of the paper), and the view set its pixel is matched
+//! with.
 
 use super::colony::Candidate;
 use super::cost::Evaluator;
@@ -38,13 +39,13 @@ impl<'a, S: Simd> InitialColony<'a, S> {
         }
     }
 
-    /// Fills a colony, best food source first: the previous estimate, the candidate of another view, and perturbed or random
-    /// planes; returns whether the pixel is textureless. The colony of a textureless pixel holds its previous estimate or a
-    /// random plane at the highest cost, and is not searched.
+    /// Fills a colony, best food source first: the previous estimate, the candidate of another view, and
+    /// perturbed or random planes; returns whether the pixel is textureless. The colony of a textureless
+    /// pixel holds its previous estimate or a random plane at the highest cost, and is not searched.
     ///
-    /// Around a validated estimate all other food sources are perturbations of it. An estimate that is not validated may be
-    /// far off: random planes, stratified in inverse depth, take their place but for the second food source, unless that is
-    /// a candidate.
+    /// Around a validated estimate all other food sources are perturbations of it. An estimate that is not
+    /// validated may be far off: random planes, stratified in inverse depth, take their place but for the
+    /// second food source, unless that is a candidate.
     #[inline(always)]
     pub fn fill(&mut self, at: Position, index: usize, colony: &mut [FoodSource], sets: PixelSets) -> bool {
         let InitialColony { search, selector, evaluator } = self;

@@ -1,5 +1,5 @@
-//! The plane fitted to the depths around a pixel, beyond the paper: matching determines depths more sharply than normals,
-//! so the depths of many neighbors determine the normal.
+//! The plane fitted to the depths around a pixel, beyond the paper: matching determines depths more sharply
+//! than normals, so the depths of many neighbors determine the normal.
 
 use super::colony::Colonies;
 use super::food_source::FoodSource;
@@ -10,11 +10,13 @@ use glam::{Mat2, Vec2};
 
 /// Neighbors a fit needs: twice its three unknowns.
 const MIN_NEIGHBORS: u32 = 6;
-/// Determinant of the scatter matrix of the neighbors' positions, in pixels^4, below which they lie on a line.
+/// Determinant of the scatter matrix of the neighbors' positions, in pixels^4, below which they lie on a
+/// line.
 const MIN_SCATTER: f32 = 1.0;
 
-/// The least-squares plane in inverse depth through those neighbors whose depths continue the plane of a food source of
-/// this pixel up to a relative `tolerance`; `None` where they are too few or the plane is not usable.
+/// The least-squares plane in inverse depth through those neighbors whose depths continue the plane of a food
+/// source of this pixel up to a relative `tolerance`; `None` where they are too few or the plane is not
+/// usable.
 #[inline(always)]
 pub fn fit(
     problem: &Problem,

@@ -1,8 +1,10 @@
-//! The Artificial Multi-Bee Colony search (section 5 of the paper): one colony a pixel, whose food sources are planes.
+//! The Artificial Multi-Bee Colony search (section 5 of the paper): one colony a pixel, whose food sources
+//! are planes.
 //!
-//! A search visits the pixels of one checkerboard color after the other. In each iteration employed bees perturb the food
-//! sources of a colony, onlooker bees bring planes of neighboring colonies, and scout bees replace food sources that do not
-//! improve. The cost of a plane is matched over the pixel's view set ([`matching`](crate::matching)).
+//! A search visits the pixels of one checkerboard color after the other. In each iteration employed bees
+//! perturb the food sources of a colony, onlooker bees bring planes of neighboring colonies, and scout bees
+//! replace food sources that do not improve. The cost of a plane is matched over the pixel's view set
+//! ([`matching`](crate::matching)).
 
 mod aggregation;
 mod colony;

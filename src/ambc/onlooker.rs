@@ -8,8 +8,8 @@ use super::rules::OnlookerRules;
 use crate::geometry::{Offset, Position};
 use crate::simd::Simd;
 
-/// The neighbors an onlooker may visit, all of the other checkerboard color: 1, 3 and 5 pixels along the axes, and a
-/// knight's move away.
+/// The neighbors an onlooker may visit, all of the other checkerboard color: 1, 3 and 5 pixels along the
+/// axes, and a knight's move away.
 pub const OFFSETS: [Offset; 20] = [
     (1, 0),
     (-1, 0),
@@ -36,8 +36,9 @@ pub const OFFSETS: [Offset; 20] = [
 /// Relative depth difference up to which two planes of the same normal are the same.
 const SAME_DEPTH: f32 = 1e-6;
 
-/// Tries, for every food source, the best plane of a random neighbor of the other color, transferred to this pixel, and
-/// keeps the better of both. A validated plane has a bonus in that comparison (section 5.6 of the paper).
+/// Tries, for every food source, the best plane of a random neighbor of the other color, transferred to this
+/// pixel, and keeps the better of both. A validated plane has a bonus in that comparison (section 5.6 of the
+/// paper).
 #[inline(always)]
 pub fn send<S: Simd>(
     evaluator: &mut Evaluator<S>,
@@ -64,8 +65,9 @@ pub fn send<S: Simd>(
     }
 }
 
-/// The offset of the neighbor of lowest cost among so many random ones; of equals the first. Different gray values raise
-/// the cost: where one surface has more texture than the next, its planes have the lower costs on both.
+/// The offset of the neighbor of lowest cost among so many random ones; of equals the first. Different gray
+/// values raise the cost: where one surface has more texture than the next, its planes have the lower costs
+/// on both.
 #[inline(always)]
 fn best_of_tournament<S: Simd>(
     evaluator: &Evaluator<S>,
@@ -91,7 +93,8 @@ fn best_of_tournament<S: Simd>(
     Some(best)
 }
 
-/// A random offset to a pixel inside the image: at a border the offset is mirrored; in tiny images there may be none.
+/// A random offset to a pixel inside the image: at a border the offset is mirrored; in tiny images there may
+/// be none.
 #[inline(always)]
 fn random_neighbor(colonies: &Colonies, (x, y): Position, random: &mut Random) -> Option<Offset> {
     let (dx, dy) = OFFSETS[random.below(OFFSETS.len())];

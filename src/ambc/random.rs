@@ -1,9 +1,10 @@
-//! Random numbers as a function of where they are used, so that the result does not depend on the order of work.
+//! Random numbers as a function of where they are used, so that the result does not depend on the order of
+//! work.
 
 use glam::Vec3;
 
-/// Draws for one visit of one pixel: a counter hashed with the run's seed, the view, scale, cycle and iteration (all in
-/// `stream`) and the pixel. There is no shared state.
+/// Draws for one visit of one pixel: a counter hashed with the run's seed, the view, scale, cycle and
+/// iteration (all in `stream`) and the pixel. There is no shared state.
 #[derive(Debug, Clone)]
 pub struct Random {
     key: u64,

@@ -20,7 +20,8 @@ pub struct SearchRules {
     pub employed_bees: usize,
     /// How onlooker bees choose.
     pub onlookers: OnlookerRules,
-    /// Relative inverse-depth error up to which a neighbor takes part in the local plane fit; 0 fits no planes.
+    /// Relative inverse-depth error up to which a neighbor takes part in the local plane fit; 0 fits no
+    /// planes.
     pub local_plane_tolerance: f32,
     /// Views that a pixel with a previous estimate is matched with; 0 takes its whole view set.
     pub max_views_per_pixel: usize,
@@ -52,8 +53,8 @@ pub struct CostRules {
     pub smoothness: SmoothnessRules,
 }
 
-/// The penalty of disagreement with the source views' validated surfaces, quadratic up to a limit: hypotheses that nearly
-/// agree are left to the images, and a wrong neighbor cannot rule out a good match.
+/// The penalty of disagreement with the source views' validated surfaces, quadratic up to a limit: hypotheses
+/// that nearly agree are left to the images, and a wrong neighbor cannot rule out a good match.
 #[derive(Debug, Clone, Copy)]
 pub struct GeometricRules {
     /// Cost of a squared relative depth error; 0 turns the term off.
@@ -64,7 +65,8 @@ pub struct GeometricRules {
     pub missing_cost: f32,
 }
 
-/// The penalty of disagreement with neighbors, quadratic up to a limit: planes that nearly agree are left to the images.
+/// The penalty of disagreement with neighbors, quadratic up to a limit: planes that nearly agree are left to
+/// the images.
 #[derive(Debug, Clone, Copy)]
 pub struct SmoothnessRules {
     /// Cost at the limit against all four neighbors; 0 turns the term off.

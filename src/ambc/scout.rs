@@ -5,8 +5,8 @@ use super::food_source::FoodSource;
 use super::random::Random;
 use crate::simd::Simd;
 
-/// Replaces the food source of the most failed attempts by a random one when they exceed the limit; never the best one,
-/// which is first.
+/// Replaces the food source of the most failed attempts by a random one when they exceed the limit; never the
+/// best one, which is first.
 #[inline(always)]
 pub fn send<S: Simd>(
     evaluator: &mut Evaluator<S>,

@@ -1,5 +1,5 @@
-//! The search of one reference view in one cycle: bands of rows on the threads, tiles within a band, and the two colors of
-//! the checkerboard in turn.
+//! The search of one reference view in one cycle: bands of rows on the threads, tiles within a band, and the
+//! two colors of the checkerboard in turn.
 
 use super::colony::{Colonies, color};
 use super::cost::Evaluator;
@@ -21,8 +21,8 @@ const TILE_COLUMNS: usize = 64;
 
 /// The result of a search.
 pub struct SearchResult {
-    /// The best plane of every pixel, `validated` where it comes from a validated one; depth 0 where the mask leaves the
-    /// pixel out.
+    /// The best plane of every pixel, `validated` where it comes from a validated one; depth 0 where the mask
+    /// leaves the pixel out.
     pub planes: Vec<PixelEstimate>,
     /// The source views that see the previous estimate of each pixel: those the pixel is checked against.
     pub view_sets: ViewSets,

@@ -1,5 +1,5 @@
-//! The smoothness term of the cost, beyond the paper: the validated planes of the four neighbors, weighted by the
-//! similarity of gray values, predict the plane of a pixel; disagreement adds to its cost.
+//! The smoothness term of the cost, beyond the paper: the validated planes of the four neighbors, weighted by
+//! the similarity of gray values, predict the plane of a pixel; disagreement adds to its cost.
 //!
 //! ```text
 //! cost = weight / 4 * sum over validated neighbors of similarity * min(1, e)^2

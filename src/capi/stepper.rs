@@ -153,7 +153,7 @@ pub unsafe extern "C" fn skep_stepper_get_cycle(
             Failure::argument(
                 "cycle",
                 cycle,
-                format!("a cycle below their number, {}", stepper.cycles().len()),
+                format!("a cycle below the number of cycles, {}", stepper.cycles().len()),
             )
         })?;
         out.set(skep_cycle {

@@ -1,8 +1,8 @@
-//! Averaging across views, beyond the paper: every view finds a surface with errors of its own. Each validated plane is
-//! averaged with those that the source views published of the same surface.
+//! Averaging across views, beyond the paper: every view finds a surface with errors of its own. Each
+//! validated plane is averaged with those that the source views published of the same surface.
 //!
 //! ```text
-//! 1/d = (1/d_0 + sum w_i / d_i) / (1 + sum w_i)     w_i = (1 - e_i^2)^2 for e_i < 1 (Tukey's biweight), else 0
+//! 1/d = (1/d_0 + sum w_i / d_i) / (1 + sum w_i)     w_i = (1 - e_i^2)^2 for e_i < 1, else 0 (Tukey)
 //! n   = n_0 + sum w_i n_i, normalized               e_i = (d_0 / d_i - 1) / 0.01
 //! ```
 //!
@@ -15,11 +15,12 @@ use crate::simd::{Simd, SimdLevel, Task, dispatch};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Relative difference of inverse depths from which on a source view's plane is another surface and has no weight.
+/// Relative difference of inverse depths from which on a source view's plane is another surface and has no
+/// weight.
 const MAX_DIFFERENCE: f32 = 0.01;
 
-/// Averages the validated planes of a view with the published surfaces of its sources; planes whose average is not usable
-/// stay. Returns the planes; the others are as they were.
+/// Averages the validated planes of a view with the published surfaces of its sources; planes whose average
+/// is not usable stay. Returns the planes; the others are as they were.
 pub fn average(level: SimdLevel, problem: &Problem, planes: &[PixelEstimate]) -> Vec<PixelEstimate> {
     let mut averaged = planes.to_vec();
     dispatch(level, AverageTask { problem, planes: &mut averaged });
@@ -121,7 +122,8 @@ mod tests {
     use crate::ambc::Random;
     use crate::testing::{self, World};
 
-    /// The world with the wall validated in all views, each depth times a factor of its own; the first view's planes.
+    /// The world with the wall validated in all views, each depth times a factor of its own; the first view's
+    /// planes.
     fn disturbed(factor: impl Fn(usize, &mut Random) -> f32) -> (World, Vec<PixelEstimate>) {
         let mut world = World::five();
         let mut maps = world.exact();

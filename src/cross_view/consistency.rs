@@ -1,16 +1,16 @@
-//! Geometric consistency check (section 5.6 of the paper): a plane is validated when enough of the source views of its
-//! pixel found the same surface.
+//! Geometric consistency check (section 5.6 of the paper): a plane is validated when enough of the source
+//! views of its pixel found the same surface.
 //!
 //! ```text
 //! same depth   |d_own - d| < depth_tolerance * d        d: depth of the point in the source view
-//! in front     d - d_own > depth_tolerance * d          d_own: the source view's own depth at the nearest pixel
+//! in front     d - d_own > depth_tolerance * d          d_own: the source's depth at the nearest pixel
 //! same normal  (R n) . n_own > cos(normal_tolerance)
 //! consistent   same depth and same normal
 //! validated    consistent >= min_consistent_views and consistent >= min_consistent_fraction * counted
 //! ```
 //!
-//! Counted are the views of the pixel's view set that have the point in their image; with `ignore_occluders` less those whose
-//! own depth is in front.
+//! Counted are the views of the pixel's view set that have the point in their image; with `ignore_occluders`
+//! less those whose own depth is in front.
 
 use crate::error::Result;
 use crate::geometry::ViewSets;
@@ -21,8 +21,8 @@ use crate::scene::{PixelEstimate, Verdict};
 use crate::simd::{LANES, Simd, SimdLevel, Task, dispatch};
 use glam::Vec3;
 
-/// The depth tolerance of the recheck of filled pixels, as a fraction of the check's: their planes have no cost of their own
-/// as evidence.
+/// The depth tolerance of the recheck of filled pixels, as a fraction of the check's: their planes have no
+/// cost of their own as evidence.
 const RECHECK_TOLERANCE: f32 = 0.5;
 
 /// The thresholds of the check.
@@ -61,7 +61,8 @@ impl ConsistencyRules {
         ConsistencyRules { depth_tolerance: RECHECK_TOLERANCE * self.depth_tolerance, ..self }
     }
 
-    /// Compares the depths of a plane in eight source views' frames with the source views' own, 0 where they have none.
+    /// Compares the depths of a plane in eight source views' frames with the source views' own, 0 where they
+    /// have none.
     #[inline(always)]
     pub fn compare<S: Simd>(&self, simd: S, depth: S::F32, own: S::F32) -> DepthComparison {
         let tolerance = simd.mul(simd.splat(self.depth_tolerance), depth);
@@ -157,7 +158,8 @@ impl Task for CheckTask<'_> {
 }
 
 impl ConsistencyCheck<'_> {
-    /// The verdict on the plane of the projector's pixel by the views of a set; views whose image it leaves do not count.
+    /// The verdict on the plane of the projector's pixel by the views of a set; views whose image it leaves
+    /// do not count.
     #[inline(always)]
     fn verdict<S: Simd>(
         &self,
@@ -171,7 +173,8 @@ impl ConsistencyCheck<'_> {
             let projections = group.project(simd, plane.depth);
             let mut known = projections.inside & ViewSets::eight(set, index);
             let pixels = group.nearest_pixels(simd, &projections);
-            // All are loaded before any is compared: the loads, far apart in memory, then do not wait for each other.
+            // All are loaded before any is compared: the loads, far apart in memory, then do not wait for
+            // each other.
             let mut own_depths = [0.0; LANES];
             for (lane, (own, planes)) in own_depths.iter_mut().zip(&self.sources[index * LANES..]).enumerate()
             {
@@ -222,7 +225,8 @@ mod tests {
         ConsistencyRules::new(&options(ignore_occluders))
     }
 
-    /// Compares a plane at depth `scale` with a source view's own depth of `factor` times that and a normal `degrees` away.
+    /// Compares a plane at depth `scale` with a source view's own depth of `factor` times that and a normal
+    /// `degrees` away.
     fn compare(rules: &ConsistencyRules, scale: f32, factor: f32, degrees: f32) -> (DepthComparison, bool) {
         let own = Vec3::new(degrees.to_radians().sin(), 0.0, -degrees.to_radians().cos());
         let depths = rules.compare(Scalar, [scale; LANES], [scale * factor; LANES]);
@@ -305,7 +309,8 @@ mod tests {
         check.run().unwrap()
     }
 
-    /// The verdict on the exact wall in the middle when the depths of the first sources are multiplied by these factors.
+    /// The verdict on the exact wall in the middle when the depths of the first sources are multiplied by
+    /// these factors.
     fn verdict_with(factors: &[f32], ignore_occluders: bool) -> Verdict {
         let world = World::five();
         let mut maps = world.exact();

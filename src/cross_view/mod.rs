@@ -1,4 +1,5 @@
-//! Operations across views: the consistency check and the propagation of planes (section 5.6 of the paper), and averaging.
+//! Operations across views: the consistency check and the propagation of planes (section 5.6 of the paper),
+//! and averaging.
 
 mod averaging;
 mod consistency;

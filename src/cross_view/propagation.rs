@@ -1,5 +1,5 @@
-//! Propagation across views (section 5.6.1 of the paper): consistent planes become candidates of pixels of other views that
-//! have no validated plane.
+//! Propagation across views (section 5.6.1 of the paper): consistent planes become candidates of pixels of
+//! other views that have no validated plane.
 
 use crate::ambc::Candidate;
 use crate::error::Result;
@@ -34,9 +34,9 @@ pub struct Target<'a> {
 /// Pixels that one thread takes at once; `advance` is told before each block.
 const BLOCK: usize = 1 << 13;
 
-/// The candidates of the pixels of a target view, depth 0 where there is none: for each pixel that is not validated, of all
-/// donors' planes that project there and are consistent with at least one of their source views, the one of lowest cost. The
-/// order of the donors does not matter.
+/// The candidates of the pixels of a target view, depth 0 where there is none: for each pixel that is not
+/// validated, of all donors' planes that project there and are consistent with at least one of their source
+/// views, the one of lowest cost. The order of the donors does not matter.
 ///
 /// # Errors
 /// What `advance` returns.
@@ -121,8 +121,8 @@ fn nearest_pixel(camera: &Camera, point: Vec3) -> Option<usize> {
     is_inside.then(|| camera.grid().index((x as usize, y as usize)))
 }
 
-/// The depth, exactly at a pixel, of a plane through a point of the target's frame; `None` where it is not usable. In f64:
-/// the point may be far from the pixel's ray.
+/// The depth, exactly at a pixel, of a plane through a point of the target's frame; `None` where it is not
+/// usable. In f64: the point may be far from the pixel's ray.
 fn depth_at(target: &Target, pixel: usize, point: DVec3, normal: DVec3) -> Option<f32> {
     let (x, y) = target.camera.grid().position(pixel);
     let facing = normal.dot(target.camera.ray(DVec2::new(x as f64, y as f64)));

@@ -16,16 +16,16 @@ pub(super) struct Member {
     pub(super) weight: f64,
 }
 
-/// Members further from the median than this many median absolute deviations (two standard deviations of
-/// Gaussian errors) are left out: depths that agree within a percent may still be worse than what they would
-/// be averaged with.
+/// Members farther from the median than this many median absolute deviations (two standard deviations of
+/// Gaussian errors) are left out: a depth within the tolerance can still have a much larger error than the
+/// others.
 const MAX_DEVIATIONS: f64 = 3.0;
 
 /// Color of points without a picture.
 const GRAY: [u8; 3] = [128; 3];
 
-/// Weighted means of position, normal (unit) and color over the members that lie closest together; the first
-/// is the one the point started from. `color` is `None` for members without a picture.
+/// Weighted means of position, normal (unit) and color over the members within [`MAX_DEVIATIONS`] of the
+/// median; the first member is the pixel of the reference. `color` is `None` for members without a picture.
 pub(super) fn average(
     members: &[Member],
     color: impl Fn(&Member) -> Option<[u8; 3]>,

@@ -1,10 +1,9 @@
 //! Fusion of depth and normal maps into points (section 6 of the paper).
 //!
-//! Views are the reference one after the other. The point behind each of its pixels is projected into the
-//! overlapping views and compared with the depth and normal of the pixel on which it falls. With enough
-//! consistent views it becomes a point of the cloud, averaged over them, and their pixels start no points of
-//! their own. Pixels on which no point falls do, so the cloud is as dense as the view that saw a surface
-//! best.
+//! Each view in turn is the reference. The 3D point of each of its pixels is projected into the overlapping
+//! views and compared with depth and normal of the pixel there. With enough consistent views it becomes a
+//! point of the cloud, the average over them, and their pixels start no points of their own. All other pixels
+//! do, so each surface gets the density of the view with the highest resolution on it.
 
 mod average;
 mod cloud;
@@ -257,7 +256,8 @@ impl<'a> Reference<'a> {
                 Comparison::Unknown => {}
             }
         }
-        // At edges of thin things, views that are half a pixel off see past them: it takes a majority.
+        // At edges of thin objects the pixel of another view, half a pixel off, may be on the background:
+        // only a majority of conflicts rejects a point.
         members.len() > self.options.min_views as usize && conflicts <= members.len()
     }
 }

@@ -1,4 +1,4 @@
-//! Which views overlap.
+//! Overlap of views by the sparse points they share.
 
 use crate::scene::SparsePoint;
 use std::collections::BTreeSet;
@@ -26,7 +26,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn views_overlap_when_they_share_a_point_and_with_all_when_no_point_tells() {
+    fn views_overlap_when_they_share_a_point_and_a_view_without_points_overlaps_all() {
         let point = |views: &[u32]| SparsePoint { position: Default::default(), views: views.to_vec() };
         let overlaps = overlaps(4, &[point(&[0, 2]), point(&[2, 3, 0])]);
         assert_eq!(overlaps, [vec![2, 3], vec![0, 2, 3], vec![0, 3], vec![0, 2]]);

@@ -16,7 +16,8 @@ pub(super) enum Comparison {
     Unknown,
 }
 
-/// Depth tolerances beyond which a view's surface is clearly behind a point: at one, noise would do.
+/// How far behind a point a view's surface must be to conflict with it, in depth tolerances: at one, noise
+/// would suffice.
 const CONFLICT_TOLERANCES: f64 = 2.0;
 
 /// A view that overlaps the reference, with the transforms from one to the other.

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use std::ops::RangeInclusive;
 
-/// Depths that are finite in the solver's f32, and so are their inverses.
+/// Depths that are finite in f32, as are their inverses.
 const REPRESENTABLE: RangeInclusive<f64> = 1e-30..=1e30;
 
 /// The range of depths in which surfaces are searched, in world units, `0 < near < far`.

@@ -1,4 +1,4 @@
-//! Photographs as the host passes them in.
+//! Photographs in memory.
 
 use crate::error::{Error, Result};
 use std::sync::Arc;
@@ -65,7 +65,11 @@ fn check_size(name: &str, width: u32, height: u32, count: usize) -> Result<()> {
     let expected = width as usize * height as usize;
     if width == 0 || height == 0 || count != expected {
         let value = format!("{count} values for {width} x {height} pixels");
-        return Err(Error::argument(name, value, format!("{expected} values and no side of 0")));
+        return Err(Error::argument(
+            name,
+            value,
+            format!("{expected} values, a width and height of at least 1"),
+        ));
     }
     Ok(())
 }

@@ -64,8 +64,8 @@ fn write_map(
 /// Reads a depth map.
 ///
 /// # Errors
-/// Not one channel; a size that does not match the header; a depth that is negative or not finite: neither
-/// COLMAP nor this crate writes one, so the file is damaged or of another kind.
+/// A number of channels other than 1; a size that does not match the header; a depth that is negative or not
+/// finite, which neither COLMAP nor this crate writes.
 pub fn read_depth_map(path: &Path) -> Result<Grid<f32>> {
     let (mut file, width, height) = open_map(path, 1)?;
     let mut values = vec![0.0; width as usize * height as usize];
@@ -84,7 +84,7 @@ pub fn read_depth_map(path: &Path) -> Result<Grid<f32>> {
 /// Reads a normal map.
 ///
 /// # Errors
-/// Not three channels; a size that does not match the header; a normal that is not finite.
+/// A number of channels other than 3; a size that does not match the header; a normal that is not finite.
 pub fn read_normal_map(path: &Path) -> Result<Grid<[f32; 3]>> {
     let (mut file, width, height) = open_map(path, 3)?;
     let mut values = vec![[0.0; 3]; width as usize * height as usize];
@@ -105,14 +105,15 @@ pub fn read_normal_map(path: &Path) -> Result<Grid<[f32; 3]>> {
     Ok(Grid { width, height, values })
 }
 
-/// Opens a map whose size matches its header.
+/// Opens a map and checks its size against the header.
 fn open_map(path: &Path, channels: u32) -> Result<(FileReader, u32, u32)> {
     let (file, width, height) = open_header(path, channels)?;
-    // The product of three such numbers fits into 128 bits.
+    // The product of three 32-bit numbers and 4 fits into 128 bits.
     let expected = u128::from(width) * u128::from(height) * u128::from(channels) * 4;
     if expected != u128::from(file.remaining()) {
         return Err(file.error(format!(
-            "{} bytes follow the header {width}&{height}&{channels}&; expected {width} x {height} x {channels} x 4",
+            "{} bytes follow the header {width}&{height}&{channels}&; expected {width} x {height} x \
+             {channels} x 4",
             file.remaining()
         )));
     }
@@ -136,7 +137,7 @@ fn open_header(path: &Path, channels: u32) -> Result<(FileReader, u32, u32)> {
     }
     let [width, height, found] = numbers;
     if width == 0 || height == 0 || found != channels {
-        let expected = format!("no side of 0 and {channels} channel(s)");
+        let expected = format!("a width and height of at least 1 and {channels} channel(s)");
         return Err(file.error(format!("the header is {width}&{height}&{found}&; expected {expected}")));
     }
     Ok((file, width, height))
@@ -216,7 +217,7 @@ pub fn read_consistency_graph(path: &Path) -> Result<ConsistencyGraph> {
     Ok(graph)
 }
 
-/// Refuses buffers of another size than the image.
+/// Returns an error unless a buffer has one value for each pixel.
 pub(super) fn check_length(name: &str, width: u32, height: u32, length: usize) -> Result<()> {
     if width as usize * height as usize == length {
         return Ok(());

@@ -1,11 +1,11 @@
-//! Files that are written whole or not at all, and a reader of binary files that checks every size.
+//! Atomic writes of files, and a reader of binary files that checks every size.
 
 use crate::error::{Error, Result};
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::{Component, Path, PathBuf};
 
-/// Writes a file under a temporary name in the same folder and renames it; the folder is made when missing.
+/// Writes a file under a temporary name in the same folder and renames it; a missing folder is created.
 pub fn write_file(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<&mut File>) -> io::Result<()>,
@@ -17,7 +17,7 @@ pub fn write_file(
     let attempt = || -> io::Result<()> {
         std::fs::create_dir_all(folder)?;
         let mut builder = tempfile::Builder::new();
-        // Temporary files are private by default; the result is a file like any other, as the umask wants it.
+        // Temporary files are private to the user; the result gets the permissions of the umask.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let mut temporary = builder.tempfile_in(folder)?;
@@ -40,13 +40,13 @@ pub(super) fn stays_inside(name: &str) -> bool {
 /// What [`stays_inside`] requires, for error texts.
 pub(super) const NAME_INSIDE: &str = "a path below the folder of images, without `..`";
 
-/// Copies a file, whole or not at all.
+/// Copies a file atomically.
 pub(super) fn copy_file(from: &Path, to: &Path) -> Result<()> {
     let mut source = File::open(from).map_err(|error| cannot_be_read(from, error))?;
     write_file(to, |out| io::copy(&mut source, out).map(drop))
 }
 
-/// Hard-links a file to a second place; copies it where it cannot be linked.
+/// Hard-links a file; copies it where the file system cannot link.
 pub(super) fn link_or_copy(from: &Path, to: &Path) -> Result<()> {
     if let Some(parent) = to.parent() {
         let made = std::fs::create_dir_all(parent);
@@ -58,7 +58,7 @@ pub(super) fn link_or_copy(from: &Path, to: &Path) -> Result<()> {
     }
 }
 
-/// Reads a file from start to end and never past its size.
+/// Reads a file sequentially and checks every read against its size.
 pub(super) struct FileReader {
     path: PathBuf,
     reader: BufReader<File>,
@@ -89,16 +89,15 @@ impl FileReader {
         self.remaining
     }
 
-    /// Refuses the file unless it holds `count` more entries of `size` bytes; what passes fits into memory
-    /// sizes.
+    /// Returns an error unless `count` entries of `size` bytes remain: call it before any allocation of that
+    /// size.
     pub(super) fn require(&self, count: u64, size: u64, what: &str) -> Result<()> {
         match count.checked_mul(size) {
             Some(bytes) if bytes <= self.remaining => Ok(()),
             _ => {
                 let remaining = self.remaining;
-                Err(self.error(format!(
-                    "truncated: {count} x {size} bytes of {what} announced, {remaining} left"
-                )))
+                Err(self
+                    .error(format!("truncated: {count} x {size} bytes of {what} expected, {remaining} left")))
             }
         }
     }
@@ -145,11 +144,11 @@ impl FileReader {
         Ok(())
     }
 
-    /// Refuses a file that has bytes left.
+    /// Returns an error if bytes remain.
     pub(super) fn finish(self) -> Result<()> {
         match self.remaining {
             0 => Ok(()),
-            bytes => Err(self.error(format!("{bytes} bytes too many, after the end that its counts give"))),
+            bytes => Err(self.error(format!("{bytes} bytes too many after the last entry"))),
         }
     }
 }

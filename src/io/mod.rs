@@ -1,7 +1,7 @@
-//! Scene and map files: COLMAP models, maps and clouds, pictures, and the folders they lie in.
+//! Scene and map files: COLMAP models, maps and clouds, pictures, and folder layouts.
 //!
-//! Every file is written to a temporary name in its folder and renamed, so a file that is there is whole;
-//! missing parent folders are made. Readers compare every count with the file's size before they believe it.
+//! Writes are atomic: a file is written under a temporary name in its folder and renamed. Missing parent
+//! folders are created. Readers check every count against the file's size before they allocate.
 
 mod colmap_maps;
 mod colmap_model;

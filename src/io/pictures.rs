@@ -11,7 +11,7 @@ use std::io::{self, BufReader};
 use std::path::Path;
 
 /// Reads a PNG or JPEG file, color or gray, 8 or 16 bits (16 are rounded to 8). An alpha channel is dropped;
-/// nothing else is applied, neither an orientation nor a color profile: the calibration speaks of the stored
+/// nothing else is applied, neither an orientation nor a color profile: the calibration refers to the stored
 /// pixels.
 pub fn read_picture(path: &Path) -> Result<Picture> {
     let image = open(path)?.decode().map_err(|error| cannot_be_read(path, error))?;

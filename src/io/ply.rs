@@ -16,7 +16,7 @@ use std::path::Path;
 const FLOATS: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
 const BYTES: [&str; 3] = ["red", "green", "blue"];
 
-/// One point as the file holds it.
+/// One point in the types of the file.
 #[derive(Debug, Clone, Copy, Default)]
 struct Vertex {
     /// Position, then normal.
@@ -74,7 +74,7 @@ fn header(points: usize) -> Header {
     header
 }
 
-/// Writes positions (as f32, which is all the layout has), normals and colors, binary little-endian.
+/// Writes positions (rounded to f32, the type of the layout), normals and colors, binary little-endian.
 pub fn write_ply(path: &Path, cloud: &PointCloud) -> Result<()> {
     let points = cloud.positions.len();
     for (name, length) in [("cloud.normals", cloud.normals.len()), ("cloud.colors", cloud.colors.len())] {
@@ -101,10 +101,11 @@ pub fn write_ply(path: &Path, cloud: &PointCloud) -> Result<()> {
     })
 }
 
-/// Reads what [`write_ply`] and COLMAP write; the points' views are in another file and left empty.
+/// Reads the clouds that [`write_ply`] and COLMAP write. The lists of views are empty: they are in another
+/// file, which [`read_visibility`] reads.
 ///
 /// # Errors
-/// Not a PLY file of these properties; fewer or more points than announced.
+/// Not a PLY file of these properties; fewer or more points than in the header.
 pub fn read_ply(path: &Path) -> Result<PointCloud> {
     let file = File::open(path).map_err(|error| cannot_be_read(path, error))?;
     let mut reader = Reader::new(BufReader::new(file));
@@ -124,7 +125,7 @@ pub fn read_ply(path: &Path) -> Result<PointCloud> {
         .map_err(|error| Error::file(path, format!("fewer than {count} points: {error}")))?;
     let rest = reader.get_mut().fill_buf().map_err(|error| cannot_be_read(path, error))?;
     if !rest.is_empty() {
-        return Err(Error::file(path, format!("goes on after its {count} points")));
+        return Err(Error::file(path, format!("bytes follow the {count} points")));
     }
     let mut cloud = PointCloud::default();
     for Vertex { floats: [x, y, z, nx, ny, nz], color } in vertices {
@@ -151,7 +152,7 @@ pub fn write_visibility(path: &Path, views: &PointViews) -> Result<()> {
     })
 }
 
-/// Reads what [`write_visibility`] writes.
+/// Reads the views of each point from a file in the layout of [`write_visibility`].
 pub fn read_visibility(path: &Path) -> Result<PointViews> {
     let mut file = FileReader::open(path)?;
     let points = file.u64("the number of points")?;

@@ -1,4 +1,4 @@
-//! Maps as pictures to look at. Pixels without an estimate are black.
+//! Previews: maps as PNG pictures. Pixels without an estimate are black.
 
 use super::colmap_maps::check_length;
 use super::files::write_file;
@@ -58,7 +58,7 @@ pub fn write_normal_preview(path: &Path, width: u32, height: u32, normal: &[[f32
     })
 }
 
-/// Writes the number of source views of each pixel as brightness: all `sources` are white. `count` gives the
+/// Writes the number of source views of each pixel as brightness, white for all `sources`. `count` gives the
 /// number by the pixel's index (row * width + column).
 pub fn write_views_preview(
     path: &Path,

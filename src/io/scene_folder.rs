@@ -29,8 +29,8 @@ impl SceneFolder {
             Some(sparse) => Ok(SceneFolder { images: folder.join("images"), sparse }),
             None => Err(Error::file(
                 folder,
-                "no COLMAP model; expected cameras.bin and images.bin, or cameras.txt and images.txt, in sparse/ or \
-                 sparse/0/",
+                "no COLMAP model; expected cameras.bin and images.bin, or cameras.txt and images.txt, in \
+                 sparse/ or sparse/0/",
             )),
         }
     }
@@ -57,11 +57,11 @@ impl SceneFolder {
     }
 }
 
-/// Reads a scene; `depth_range` holds for every view and is needed where the model has no points.
+/// Reads a scene; `depth_range` applies to every view and is required if the model has no points.
 ///
 /// # Errors
-/// What is missing from the folder; what [`ColmapModel::read`], [`SceneFolder::read_picture`] and
-/// [`Scene::new`] refuse.
+/// A missing file or folder; the errors of [`ColmapModel::read`], [`SceneFolder::read_picture`] and
+/// [`Scene::new`].
 pub fn read_scene(folder: &Path, depth_range: Option<DepthRange>) -> Result<Scene> {
     let scene = SceneFolder::find(folder)?;
     if !scene.images.is_dir() {
@@ -80,7 +80,7 @@ pub fn read_scene(folder: &Path, depth_range: Option<DepthRange>) -> Result<Scen
 /// binary model in `sparse/`.
 ///
 /// # Errors
-/// A view whose name does not end in `.png` or leads out of the folder; a file that cannot be written.
+/// A view whose name does not end in `.png` or leads outside the folder; a file that cannot be written.
 pub fn write_scene(folder: &Path, scene: &Scene) -> Result<()> {
     for (index, view) in scene.views().iter().enumerate() {
         let path = Path::new(&view.name);

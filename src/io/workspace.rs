@@ -17,7 +17,7 @@ use crate::scene::{Maps, SparsePoint};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Which of a view's maps.
+/// Kind of a view's maps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MapKind {
     /// The raw estimate of every pixel; "photometric" in COLMAP's file names.
@@ -27,7 +27,7 @@ pub enum MapKind {
 }
 
 impl MapKind {
-    /// COLMAP's word for it, which is part of file names.
+    /// COLMAP's name of the kind, a part of file names.
     pub fn colmap_name(self) -> &'static str {
         match self {
             MapKind::Raw => "photometric",
@@ -92,16 +92,16 @@ impl Workspace {
         self.folder.join("stereo").join(what).join(format!("{name}.{}.bin", kind.colmap_name()))
     }
 
-    /// Refuses a view's name whose files would lie outside the folder.
+    /// Returns an error for a view's name whose files would be outside the folder.
     pub fn check_name(name: &str) -> Result<()> {
         if stays_inside(name) { Ok(()) } else { Err(Error::argument("view's name", name, NAME_INSIDE)) }
     }
 
     /// Writes all files of one view: depth and normal map and consistency graph of the raw estimate
-    /// (photometric) and of what was validated (geometric), and previews of the latter.
+    /// (photometric) and of the validated pixels (geometric), and previews of the latter.
     ///
     /// # Errors
-    /// A name that would lead out of the folder; a file that cannot be written.
+    /// A name that leads outside the folder; a file that cannot be written.
     pub fn write_view(&self, name: &str, camera: &Camera, result: &ViewResult) -> Result<()> {
         Workspace::check_name(name)?;
         let validated = result.validated();
@@ -115,8 +115,7 @@ impl Workspace {
         })
     }
 
-    /// Writes `stereo/patch-match.cfg` and `stereo/fusion.cfg`, the lists of images without which COLMAP does
-    /// not start.
+    /// Writes `stereo/patch-match.cfg` and `stereo/fusion.cfg`, the lists of images that COLMAP requires.
     pub fn write_lists<'a>(&self, names: impl Iterator<Item = &'a str> + Clone) -> Result<()> {
         let stereo = self.folder.join("stereo");
         write_file(&stereo.join("fusion.cfg"), |out| {
@@ -128,9 +127,9 @@ impl Workspace {
         })
     }
 
-    /// Makes the folder a workspace that COLMAP reads: photographs and model of the scene beside the maps.
-    /// The model is copied, as tools change models in place; photographs are linked where the file system
-    /// can, else copied. What is there already stays.
+    /// Adds photographs and model of the scene, which makes the folder a COLMAP workspace. The model is
+    /// copied, since tools change models in place; photographs are hard-linked where the file system can,
+    /// else copied. Existing files are kept.
     pub fn adopt(&self, scene: &SceneFolder) -> Result<()> {
         let is_new = |from: &Path, to: &Path| from.is_file() && !to.exists();
         for image in ColmapModel::read(&scene.sparse)?.images {

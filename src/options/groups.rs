@@ -1,4 +1,4 @@
-//! The one table of options: structs, names, ranges, units and explanations are all made from it.
+//! The table of options: structs, names, ranges, units and explanations are generated from it.
 
 use super::value::{Entry, Kind};
 use std::ffi::CStr;
@@ -49,7 +49,7 @@ macro_rules! from_number {
     };
 }
 
-/// The name of an option as C has it.
+/// The name of an option as a C string.
 const fn c_name(with_nul: &'static str) -> &'static CStr {
     match CStr::from_bytes_with_nul(with_nul.as_bytes()) {
         Ok(name) => name,
@@ -114,33 +114,36 @@ options! {
         sigma_color: number(0.001 to 1e6) "gray value, of [0, 1]",
         /// Weighted variance under which a window has no texture and costs 2.
         min_variance: number(0.0 to 1.0) "squared gray value, of [0, 1]",
-        /// Ratio of the window's variance to the image noise under which the pixel is not matched but filled from the
-        /// surrounding planes; 0 matches all pixels.
+        /// Ratio of the window's variance to the image noise under which the pixel is not matched but filled
+        /// from the surrounding planes; 0 matches all pixels.
         min_texture_to_noise: number(0.0 to 1000.0) "ratio of variances",
     }
 
     /// Cost: how the costs of the source views become the cost of a plane, and what is added to it.
     cost: CostOptions {
-        /// Mean over the best views of the pixel's view set; 0 takes the sum over all divided by one less than their
-        /// number (equation 3 of the paper).
+        /// Mean over the best views of the pixel's view set; 0 takes the sum over all divided by one less
+        /// than their number (equation 3 of the paper).
         best_views: count(0 to 8) "views",
-        /// From the second cycle on, match a pixel only with this many views of its set: those whose validated surfaces
-        /// its plane agrees with best, or of lowest cost where too few of them agree; 0 takes the whole set.
+        /// From the second cycle on, match a pixel only with this many views of its set: those whose
+        /// validated surfaces its plane agrees with best, or of lowest cost where too few of them agree; 0
+        /// takes the whole set.
         max_views_per_pixel: count(0 to 4294967295) "views",
-        /// Geometric consistency: cost at the largest error against the validated depth of a source view; 0 turns the
-        /// term off.
+        /// Geometric consistency: cost at the largest error against the validated depth of a source view; 0
+        /// turns the term off.
         geom_consistency_weight: number(0.0 to 1000.0) "cost",
-        /// Relative depth error against a source view's validated depth at which the penalty saturates; quadratic
-        /// below.
+        /// Relative depth error against a source view's validated depth at which the penalty saturates;
+        /// quadratic below.
         geom_consistency_max_error: number(1e-5 to 10.0) "fraction of the depth",
         /// Relative depth error that is assumed where the source view has no validated depth.
         geom_consistency_missing_error: number(0.0 to 10.0) "fraction of the depth",
-        /// Smoothness: cost of a plane that contradicts the validated planes of all four neighbors of similar gray
-        /// value; 0 turns the term off.
+        /// Smoothness: cost of a plane that contradicts the validated planes of all four neighbors of similar
+        /// gray value; 0 turns the term off.
         smoothness_weight: number(0.0 to 1000.0) "cost",
-        /// Relative depth error against a neighbor's plane at which the smoothness penalty saturates; quadratic below.
+        /// Relative depth error against a neighbor's plane at which the smoothness penalty saturates;
+        /// quadratic below.
         smoothness_max_depth_error: number(1e-6 to 1.0) "fraction of the depth",
-        /// Angle to a neighbor's normal at which the smoothness penalty saturates; quadratic in 1 - cos below.
+        /// Angle to a neighbor's normal at which the smoothness penalty saturates; quadratic in 1 - cos
+        /// below.
         smoothness_max_normal_error: number(0.001 to 180.0) "degrees",
     }
 
@@ -148,22 +151,23 @@ options! {
     search: SearchOptions {
         /// Failed attempts to improve a food source after which a scout bee may replace it.
         trial_limit: count(0 to 4294967295) "attempts",
-        /// From the second cycle on, the number of food sources, best first, that employed bees perturb; 0 takes all.
+        /// From the second cycle on, the number of food sources, best first, that employed bees perturb; 0
+        /// takes all.
         employed_bees: count(0 to 64) "food sources",
-        /// Random neighbors of which an onlooker bee visits the one of lowest cost; different gray values raise the
-        /// cost.
+        /// Random neighbors of which an onlooker bee visits the one of lowest cost; different gray values
+        /// raise the cost.
         onlooker_tournament_size: count(1 to 20) "neighbors",
-        /// Relative inverse-depth error up to which a neighbor takes part in the local plane fit of each iteration; 0
-        /// fits no planes.
+        /// Relative inverse-depth error up to which a neighbor takes part in the local plane fit of each
+        /// iteration; 0 fits no planes.
         local_plane_tolerance: number(0.0 to 1.0) "fraction of the inverse depth",
-        /// From the second cycle on, half the range of inverse depths in which food sources start around the previous
-        /// estimate, halved each cycle; 0 starts them at random.
+        /// From the second cycle on, half the range of inverse depths in which food sources start around the
+        /// previous estimate, halved each cycle; 0 starts them at random.
         depth_perturbation: number(0.0 to 0.5) "fraction of the inverse depth",
-        /// Half the side of the cube from which a vector is added to the normals of those food sources, halved each
-        /// cycle.
+        /// Half the side of the cube from which a vector is added to the normals of those food sources,
+        /// halved each cycle.
         normal_perturbation: number(0.0 to 10.0) "length, of a unit normal",
-        /// Fitness bonus of a plane that comes from a validated neighbor, in the comparison only (section 5.6 of the
-        /// paper); 0 turns it off.
+        /// Fitness bonus of a plane that comes from a validated neighbor, in the comparison only (section 5.6
+        /// of the paper); 0 turns it off.
         smoothness_reward: number(0.0 to 1.0) "fitness",
         /// Propagate consistent planes to the pixels of other views that have no validated plane.
         view_propagation: switch() "switch",
@@ -181,7 +185,8 @@ options! {
         max_sources: count(0 to 4294967295) "views",
         /// Largest angle between the normal and the ray to a source view.
         max_incident_angle: number(0.0 to 90.0) "degrees",
-        /// Relative depth by which a validated surface of a source view must lie in front of a point to occlude it.
+        /// Relative depth by which a validated surface of a source view must lie in front of a point to
+        /// occlude it.
         occlusion_tolerance: number(0.0 to 1.0) "fraction of the depth",
     }
 
@@ -191,25 +196,27 @@ options! {
         depth_tolerance: number(0.0 to 1.0) "fraction of the depth",
         /// Largest angle between the normals of consistent planes.
         normal_tolerance: number(0.0 to 180.0) "degrees",
-        /// Source views that must be consistent to validate a plane; with 1 and `best_views` a single source view is
-        /// enough to match a pixel, as scenes of two views need.
+        /// Source views that must be consistent to validate a plane; with 1 and `best_views` a single source
+        /// view is enough to match a pixel, as scenes of two views need.
         min_consistent_views: count(1 to 4294967295) "views",
         /// Fraction of the pixel's view set that must be consistent to validate a plane.
         min_consistent_fraction: number(0.0 to 1.0) "fraction of the view set",
-        /// Leave source views whose own depth is clearly smaller out of that fraction: they may be occluded there.
+        /// Leave source views whose own depth is clearly smaller out of that fraction: they may be occluded
+        /// there.
         ignore_occluders: switch() "switch",
     }
 
     /// Refinement: filters of the planes beyond the paper.
     refine: RefineOptions {
-        /// Passes of the correction of foreground fattening after a check that may be the last of its scale; 0 turns it
-        /// off.
+        /// Passes of the correction of foreground fattening after a check that may be the last of its scale;
+        /// 0 turns it off.
         fattening_passes: count(0 to 100) "passes",
         /// Passes of plane smoothing after each check; 0 turns it off.
         smoothing_passes: count(0 to 100) "passes",
         /// Average validated planes with those of the source views after the last cycle.
         cross_view_averaging: switch() "switch",
-        /// Fill small gaps from the surrounding planes after the last cycle, where the source views confirm them.
+        /// Fill small gaps from the surrounding planes after the last cycle, where the source views confirm
+        /// them.
         fill_gaps: switch() "switch",
     }
 

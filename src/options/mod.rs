@@ -1,7 +1,7 @@
 //! Every number the method depends on: grouped options, presets, and the table of names, ranges and units.
 //!
-//! Fractions are fractions, angles are degrees. Numbers that are properties of an algorithm and not choices of a user are
-//! named constants at the top of the files that use them.
+//! Fractions are fractions, angles are degrees. Numbers that are properties of an algorithm and not choices
+//! of a user are named constants at the top of the files that use them.
 
 mod groups;
 mod presets;
@@ -24,15 +24,16 @@ pub use value::{Kind, OptionInfo, OptionValue};
 
 /// All options. Start from a preset; every field may be changed.
 ///
-/// By name an option is a field with its group, such as `check.depth_tolerance`; where no other group has a field of that
-/// name, the field's name alone does.
+/// By name an option is a field with its group, such as `check.depth_tolerance`; where no other group has a
+/// field of that name, the field's name alone does.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
     /// Seed of the random generator; the same seed gives the same bits.
     pub seed: u64,
     /// Worker threads, 0 to 4096; 0 takes one for each core. The result does not depend on it.
     pub threads: usize,
-    /// Instruction set of the kernels; `None` takes the best the machine has. The result does not depend on it.
+    /// Instruction set of the kernels; `None` takes the best that the machine supports. The result does not
+    /// depend on it.
     pub simd: Option<SimdLevel>,
     /// The scales and their cycles.
     pub schedule: ScheduleOptions,
@@ -52,7 +53,7 @@ pub struct Options {
     pub fusion: FusionOptions,
 }
 
-/// The word for the best instruction set there is.
+/// The name of the best instruction set that the machine supports.
 const BEST: &str = "best";
 
 const SEED: OptionInfo = OptionInfo {
@@ -64,8 +65,8 @@ const SEED: OptionInfo = OptionInfo {
 
 const SIMD: OptionInfo = OptionInfo {
     name: "simd",
-    explanation: "Instruction set: scalar, baseline, v3, or best for the best the machine has; the result does not \
-                  depend on it.",
+    explanation: "Instruction set: scalar, baseline, v3, or best for the best the machine has; the result \
+                  does not depend on it.",
     unit: "name",
     kind: Kind::Text,
 };
@@ -73,9 +74,9 @@ const SIMD: OptionInfo = OptionInfo {
 const SCALES: OptionInfo = OptionInfo {
     name: "schedule.scales",
     explanation: "Scales from coarse to fine, each twice as large as the one before, the last at full size: \
-                  `downscale=2 food_sources=3 iterations=5+4x1; downscale=1 food_sources=2 iterations=1+2x1` is half \
-                  size with 3 food sources a pixel, 5 iterations in the first cycle and 4 more cycles of 1, then full \
-                  size.",
+                  `downscale=2 food_sources=3 iterations=5+4x1; downscale=1 food_sources=2 \
+                  iterations=1+2x1` is half size with 3 food sources a pixel, 5 iterations in the first \
+                  cycle and 4 more cycles of 1, then full size.",
     unit: "text",
     kind: Kind::Text,
 };
@@ -105,7 +106,7 @@ fn numbers() -> impl Iterator<Item = &'static Entry> {
 }
 
 impl Options {
-    /// Refuses values no run can be made with, naming the option.
+    /// Checks that every value is in its range.
     ///
     /// # Errors
     /// An option out of its range.
@@ -124,8 +125,8 @@ impl Options {
         Ok(())
     }
 
-    /// Views a hypothesis must be seen in for its cost to mean anything. The sum over all views is infinite for fewer than
-    /// two by itself.
+    /// Minimum number of views in which a hypothesis must be visible to have a finite cost. The sum over all
+    /// views is infinite for fewer than two in any case.
     pub(crate) fn min_matched_views(&self) -> usize {
         match self.cost.best_views {
             0 => 2,
@@ -146,7 +147,7 @@ impl Options {
         std::iter::once(schedule).chain(groups::GROUPS.iter().map(trimmed))
     }
 
-    /// What the option of this name is.
+    /// The description of the option of this name.
     ///
     /// # Errors
     /// No option of this name, or several.
@@ -178,11 +179,11 @@ impl Options {
         })
     }
 
-    /// Sets the option of this name that is a number; a switch is 1 or 0.
+    /// Sets the numeric option of this name; a switch is 1 or 0.
     ///
     /// # Errors
-    /// No option of this name, or several; an option that is no number; a value out of its range. Nothing is changed
-    /// then.
+    /// No option of this name, or several; an option that is not numeric; a value out of its range. No option
+    /// is changed then.
     pub fn set_number(&mut self, name: &str, value: f64) -> Result<()> {
         let info = Options::info(name)?;
         match numbers().find(|entry| entry.name() == info.name) {
@@ -191,7 +192,7 @@ impl Options {
                 (entry.set)(self, value);
             }
             None if info == SEED => {
-                // Beyond these an f64 does not hold every whole number.
+                // An f64 does not represent every larger whole number.
                 info_range(MAX_EXACT).check(info.name, value)?;
                 self.seed = value as u64;
             }
@@ -203,8 +204,8 @@ impl Options {
     /// Sets the option of this name from its text, as [`OptionValue`] displays it.
     ///
     /// # Errors
-    /// No option of this name, or several; a text that is not of its kind; a value out of its range. Nothing is changed
-    /// then.
+    /// No option of this name, or several; a text that is not of its kind; a value out of its range. No
+    /// option is changed then.
     pub fn set(&mut self, name: &str, text: &str) -> Result<()> {
         let info = Options::info(name)?;
         let text = text.trim();
@@ -244,7 +245,7 @@ impl Options {
         Options::infos().map(|info| (info.name, self.get(info.name).expect("it is listed")))
     }
 
-    /// The name with this index in [`Options::infos`], as C has it.
+    /// The name with this index in [`Options::infos`], as a C string.
     #[cfg(feature = "capi")]
     pub(crate) fn c_name(index: usize) -> Option<&'static CStr> {
         let name = Options::infos().nth(index)?.name;
@@ -255,7 +256,7 @@ impl Options {
 }
 
 impl FusionOptions {
-    /// Refuses values no fusion can be made with, naming the option.
+    /// Checks that the values are in their ranges.
     ///
     /// # Errors
     /// An option out of its range.
@@ -266,7 +267,7 @@ impl FusionOptions {
     }
 }
 
-/// The largest whole number up to which an f64 holds all.
+/// The largest whole number up to which an f64 represents all.
 const MAX_EXACT: u64 = 1 << 53;
 
 fn info_range(max: u64) -> Kind {

@@ -23,7 +23,8 @@ impl Options {
         }
     }
 
-    /// The paper as literally as its text allows; the documentation of each option says what the paper leaves open.
+    /// The paper as literally as its text allows; the documentation of each option says what the paper leaves
+    /// open.
     pub fn paper() -> Options {
         Options {
             seed: 0,
@@ -73,7 +74,8 @@ impl Options {
                 occlusion_tolerance: 0.01,
             },
             check: CheckOptions {
-                // The paper's 0.01 mm is impossible on a scene of 600 mm; its fusion calls the difference relative.
+                // The paper's 0.01 mm is impossible on a scene of 600 mm; its fusion calls the difference
+                // relative.
                 depth_tolerance: 0.01,
                 normal_tolerance: 30.0,
                 min_consistent_views: 2,
@@ -90,8 +92,8 @@ impl Options {
         }
     }
 
-    /// Most of the search on half size, one iteration at full size, fewer source views; planes are taken from the
-    /// neighborhood more often. For a first look at a scene, or where time is short.
+    /// Most of the search on half size, one iteration at full size, fewer source views; planes are taken from
+    /// the neighborhood more often. For previews, or where time is limited.
     pub fn fast() -> Options {
         let default = Options::default();
         Options {
@@ -119,7 +121,7 @@ impl Options {
 }
 
 impl Default for Options {
-    /// What measures best today.
+    /// The values of the best measured accuracy.
     fn default() -> Options {
         let paper = Options::paper();
         Options {

@@ -8,11 +8,12 @@ use std::fmt;
 /// The search on one scale of the image pyramid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scale {
-    /// How many times smaller than full size the sides of its images are: a power of two, 1 to 256.
+    /// Factor by which the images are reduced: a power of two, 1 to 256.
     pub downscale: u32,
     /// Food sources of each colony (FoodNumber of the paper), 2 to 64.
     pub food_sources: u32,
-    /// Iterations of the first cycle on this scale, 0 to 10,000; employed, onlooker and scout bees take one turn each.
+    /// Iterations of the first cycle on this scale, 0 to 10,000; each is one pass of employed, onlooker and
+    /// scout bees.
     pub first_iterations: u32,
     /// Cycles after the first, 0 to 1,000; a geometric consistency check follows every cycle.
     pub cycles: u32,
@@ -26,8 +27,8 @@ pub struct ScheduleOptions {
     /// The scales from coarse to fine, each twice as large as the one before; the last is full size.
     ///
     /// Their text form, wherever options are texts: `downscale=2 food_sources=3 iterations=5+4x1; downscale=1
-    /// food_sources=2 iterations=1+2x1` is half size with 3 food sources a pixel, 5 iterations in the first cycle and 4
-    /// more cycles of 1, then full size.
+    /// food_sources=2 iterations=1+2x1` is half size with 3 food sources a pixel, 5 iterations in the first
+    /// cycle and 4 more cycles of 1, then full size.
     pub scales: Vec<Scale>,
     /// A scale ends early once fewer than this fraction of the pixels changed in a cycle.
     ///
@@ -35,7 +36,7 @@ pub struct ScheduleOptions {
     pub min_changed_fraction: f64,
 }
 
-/// What a text of scales must look like.
+/// The text form of scales, for error texts.
 const FORM: &str =
     "scales like `downscale=2 food_sources=3 iterations=5+4x1`, separated by `;`, from coarse to fine";
 
@@ -85,7 +86,7 @@ fn scale_from_text(text: &str) -> Option<Scale> {
 }
 
 impl Options {
-    /// Refuses scales no run can be made with.
+    /// Checks the scales and their order.
     pub(super) fn check_scales(&self) -> Result<()> {
         let scales = &self.schedule.scales;
         let descending =
@@ -130,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn a_text_that_is_no_schedule_is_refused_with_the_part_that_is_wrong() {
+    fn an_invalid_schedule_is_refused_and_the_error_names_the_invalid_part() {
         let full = "downscale=1 food_sources=2 iterations=1+2x1";
         for part in [
             "",

@@ -31,7 +31,7 @@ fn every_option_is_read_back_from_its_text() {
 }
 
 #[test]
-fn a_name_without_its_group_is_enough_where_it_is_the_only_one() {
+fn a_unique_name_needs_no_group() {
     assert_eq!(Options::info("window_radius").unwrap().name, "window.window_radius");
     let error = Options::info("depth_tolerance").unwrap_err().to_string();
     assert!(error.contains("check.depth_tolerance, fusion.depth_tolerance"), "{error}");
@@ -39,7 +39,7 @@ fn a_name_without_its_group_is_enough_where_it_is_the_only_one() {
 }
 
 #[test]
-fn a_wrong_value_is_refused_with_what_would_be_right() {
+fn an_invalid_value_is_refused_and_the_error_states_the_valid_ones() {
     let mut options = Options::default();
     let message = |result: Result<()>| result.unwrap_err().to_string();
     assert_eq!(

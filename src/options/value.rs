@@ -29,7 +29,7 @@ impl fmt::Display for OptionValue {
     }
 }
 
-/// What an option is, for listings and documentation.
+/// Description of an option, for listings and documentation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OptionInfo {
     /// Its name with its group, such as `window.window_radius`.
@@ -59,7 +59,7 @@ pub enum Kind {
         /// The largest.
         max: f64,
     },
-    /// `true` or `false`, 1 or 0 where numbers are asked for.
+    /// `true` or `false`, as a number 1 or 0.
     Switch,
     /// A text, which the explanation describes.
     Text,
@@ -77,7 +77,8 @@ impl fmt::Display for Kind {
 }
 
 impl Kind {
-    /// Refuses numbers of another kind or out of range; `name` is how the error calls the option.
+    /// Returns an error for numbers of another kind or out of range; `name` is the option's name in the
+    /// error.
     pub(super) fn check(self, name: &str, value: f64) -> Result<()> {
         let holds = match self {
             Kind::Count { min, max } => value.fract() == 0.0 && (min as f64..=max as f64).contains(&value),

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::simd::Simd;
 use rayon::prelude::*;
 
-/// An image cut into bands of rows, the units of work of the threads.
+/// An image divided into bands of rows, the units of work of the threads.
 #[derive(Debug, Clone, Copy)]
 pub struct Bands {
     /// Pixels of a row.
@@ -14,11 +14,12 @@ pub struct Bands {
     pub rows: usize,
 }
 
-/// The most rows of a band: with tiles of 64 columns its working set stays in cache.
+/// Maximum number of rows of a band: with tiles of 64 columns its working set stays in cache.
 const MAX_ROWS: usize = 8;
-/// The fewest rows of a band.
+/// Minimum number of rows of a band.
 const MIN_ROWS: usize = 2;
-/// Bands for each thread that are worth lower bands: threads that end early wait for the last.
+/// Number of bands per thread below which bands get fewer rows: threads that finish early wait for the last
+/// band.
 const BANDS_PER_THREAD: usize = 8;
 
 impl Bands {
@@ -34,11 +35,11 @@ impl Bands {
     }
 }
 
-/// Does `work` for each band on the threads of the current rayon pool, compiled for the instruction set, and returns the
-/// results in order. Before each band `advance` counts its `units` of work.
+/// Runs `work` on each band with the threads of the current rayon pool, compiled for the instruction set, and
+/// returns the results in order. Before each band `advance` counts its `units` of work.
 ///
 /// # Errors
-/// What `advance` returns; bands that have not begun are left out then.
+/// What `advance` returns; the remaining bands are skipped.
 #[inline(always)]
 pub fn run_bands<S: Simd, B: Send, R: Send>(
     simd: S,

@@ -1,5 +1,4 @@
-//! Threads: the pool that ends with its owner, the one loop over bands of rows, and how work is counted, reported and
-//! cancelled.
+//! Threads: the thread pool, the loop over bands of rows, progress and cancellation.
 
 mod bands;
 mod pool;
@@ -11,6 +10,6 @@ pub use progress::{Phase, Progress, ProgressFn, ignore_progress};
 
 use crate::error::Result;
 
-/// Told by whatever takes longer than a moment how many units of work are done, from any thread;
-/// [`Error::Cancelled`](crate::Error::Cancelled) ends the work. What a unit is, the caller says.
+/// Callback of long computations, from any thread: adds this many units to the finished work. If it returns
+/// [`Error::Cancelled`](crate::Error::Cancelled), the computation ends. The caller defines the unit.
 pub type Advance<'a> = &'a (dyn Fn(u64) -> Result<()> + Sync);

@@ -1,9 +1,9 @@
-//! Threads that have ended when their pool is dropped: a host may unload the library afterwards.
+//! A thread pool that joins its threads when dropped, so that a host can unload the library.
 
 use crate::error::{Error, Result};
 use std::thread::JoinHandle;
 
-/// A rayon pool whose threads are joined when it is dropped; dropping rayon's own only asks them to end.
+/// A rayon pool whose threads are joined when it is dropped; dropping rayon's own does not wait for them.
 pub struct JoinedPool {
     /// `None` only while it is dropped.
     pool: Option<rayon::ThreadPool>,
@@ -26,7 +26,7 @@ impl JoinedPool {
         match built {
             Ok(pool) => Ok(JoinedPool { pool: Some(pool), threads: handles }),
             Err(error) => {
-                // The threads that did start end by themselves, as rayon has told them to.
+                // Rayon has signaled the started threads to end.
                 handles.into_iter().for_each(|handle| drop(handle.join()));
                 let expected = format!("a number of threads that the system can start ({error})");
                 Err(Error::argument("options.threads", threads, expected))
@@ -43,7 +43,7 @@ impl JoinedPool {
 impl Drop for JoinedPool {
     fn drop(&mut self) {
         self.pool = None;
-        // A thread's panic has already been handed to the one that waited for its work.
+        // A panic has already been propagated to the caller that waited for the work.
         self.threads.drain(..).for_each(|thread| drop(thread.join()));
     }
 }
@@ -54,16 +54,17 @@ mod tests {
     use std::sync::Arc;
 
     #[test]
-    fn no_thread_is_left_when_the_pool_is_gone() {
+    fn dropping_the_pool_joins_its_threads() {
         let witness = Arc::new(());
         let pool = JoinedPool::new(3).unwrap();
-        thread_local!(static KEPT: std::cell::RefCell<Option<Arc<()>>> = const { std::cell::RefCell::new(None) });
+        use std::cell::RefCell;
+        thread_local!(static KEPT: RefCell<Option<Arc<()>>> = const { RefCell::new(None) });
         pool.install(|| {
             rayon::broadcast(|_| KEPT.with(|kept| *kept.borrow_mut() = Some(witness.clone())));
         });
         assert_eq!(Arc::strong_count(&witness), 4);
         drop(pool);
-        // What a thread keeps for itself goes when it ends.
+        // Thread-local values are dropped when their thread ends.
         assert_eq!(Arc::strong_count(&witness), 1);
     }
 }

@@ -1,8 +1,8 @@
-//! How a host follows a call and cancels it.
+//! Progress and cancellation of a call.
 
 use std::ops::ControlFlow;
 
-/// What a run is doing.
+/// Phase of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
     /// The planes of a view are searched.
@@ -24,28 +24,30 @@ impl Phase {
     }
 }
 
-/// How far a run is.
+/// Progress of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
-    /// What is done now.
+    /// Current phase.
     pub phase: Phase,
     /// Size of the images searched: 1 is full, 2 half, 4 a quarter.
     pub downscale: u32,
     /// The cycle on this scale, counted from 0.
     pub cycle: u32,
-    /// The view that is worked on, counted from 0.
+    /// Current view, counted from 0.
     pub view: usize,
     /// Number of views.
     pub views: usize,
-    /// Fraction of the whole call that is done, 0 to 1. Cycles that are skipped because a scale ended early count as done.
+    /// Fraction of the whole call that is done, 0 to 1. Cycles that are skipped because a scale ended early
+    /// count as done.
     pub done: f64,
 }
 
-/// The callback of a host, for progress and for cancelling: called often, from any worker thread, several calls may run at
-/// once; it must be quick. `Break` cancels the call, which then ends with [`crate::Error::Cancelled`] well within a second.
+/// Callback of the host for progress and cancellation: called often, from any worker thread, and from several
+/// at once; it must be fast. `Break` cancels the call, which then returns [`crate::Error::Cancelled`] well
+/// within a second.
 pub type ProgressFn<'a> = &'a (dyn Fn(&Progress) -> ControlFlow<()> + Sync);
 
-/// The callback of a host that neither watches nor cancels.
+/// A progress callback that does nothing.
 pub fn ignore_progress(_: &Progress) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }

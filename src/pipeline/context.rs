@@ -1,4 +1,5 @@
-//! What all stages of a run share, and nothing changes: options, images of all scales, source lists, the order of the cycles.
+//! Immutable data that all stages of a run share: options, images of all scales, source lists, order of the
+//! cycles.
 
 use super::cycle::{Cycle, CycleRecord, Place};
 use super::sources::PublishedSurfaces;
@@ -26,7 +27,8 @@ pub struct RunContext {
 }
 
 impl RunContext {
-    /// Reduces the images to all scales and chooses the source views; `advance` is told of 0 units before each image.
+    /// Reduces the images to all scales and chooses the source views; calls `advance` with 0 units before
+    /// each image.
     ///
     /// # Errors
     /// An option out of its range, named; what `advance` returns.
@@ -61,12 +63,12 @@ impl RunContext {
         self.sources.lists.len()
     }
 
-    /// The source views of a view, along which its view sets count.
+    /// The source views of a view, which its view sets index.
     pub fn sources(&self, view: usize) -> &[u32] {
         &self.sources.lists[view]
     }
 
-    /// What the user should know about the choice of source views, in sentences.
+    /// Warnings about the selection of source views, as sentences.
     pub fn warnings(&self) -> &[String] {
         &self.sources.warnings
     }
@@ -81,7 +83,7 @@ impl RunContext {
         &self.scaled[self.cycles[at.cycle].scale_index][at.view]
     }
 
-    /// What the filters of a view's planes know of it.
+    /// The data of a view that the filters of its planes read.
     pub fn filtered_view(&self, at: Place) -> FilteredView<'_> {
         let ScaledView { camera, image, range, .. } = self.scaled(at);
         FilteredView { camera, image, range: *range }
@@ -112,8 +114,8 @@ impl RunContext {
         (0..self.views()).filter(has_view).filter_map(donor).collect()
     }
 
-    /// The cycle after this one, whose records these are; `None` after the last. A scale ends early once fewer pixels changed
-    /// than the option `schedule.min_changed_fraction` asks for.
+    /// The cycle after this one, whose records these are; `None` after the last. A scale ends early once
+    /// fewer pixels changed than the option `schedule.min_changed_fraction` asks for.
     pub fn next_cycle<'e>(
         &self,
         cycle: usize,
@@ -147,29 +149,29 @@ impl RunContext {
         self.cycles[..cycle].iter().map(|cycle| cycle.work(pixels(cycle.scale_index))).sum()
     }
 
-    /// Where the run is in a phase of a view.
+    /// The progress of the run in a phase of a view.
     pub fn progress(&self, phase: Phase, at: Place) -> Progress {
         let cycle = &self.cycles[at.cycle];
         let (downscale, views) = (cycle.scale.downscale, self.views());
         Progress { phase, downscale, cycle: cycle.cycle, view: at.view, views, done: 0.0 }
     }
 
-    /// Refuses a cycle or view that does not exist.
+    /// Returns an error for a cycle or view that does not exist.
     pub fn check_place(&self, at: Place) -> Result<()> {
         if at.cycle >= self.cycles.len() {
-            let expected = format!("a cycle below their number, {}", self.cycles.len());
+            let expected = format!("a cycle below the number of cycles, {}", self.cycles.len());
             return Err(Error::argument("cycle", at.cycle, expected));
         }
         if at.view >= self.views() {
-            let expected = format!("a view below their number, {}", self.views());
+            let expected = format!("a view below the number of views, {}", self.views());
             return Err(Error::argument("view", at.view, expected));
         }
         Ok(())
     }
 }
 
-/// The window of a scale. At full size after coarser scales the surfaces are known: a smaller window keeps to one of them at
-/// edges.
+/// The window of a scale. At full size after coarser scales the planes are approximately known, and a smaller
+/// window covers fewer surfaces at edges.
 fn window(options: &Options, scale: usize) -> Window {
     let own = &options.window;
     let is_full_size_after_coarser = scale > 0 && options.schedule.scales[scale].downscale == 1;

@@ -28,8 +28,8 @@ impl Cycle {
         if self.cycle == 0 { self.scale.first_iterations } else { self.scale.cycle_iterations }
     }
 
-    /// Units of work of searching this many pixels: a unit is a food source that is filled or improved, those of both
-    /// checkerboard colors together counted once.
+    /// Units of work of searching this many pixels: a unit is a food source that is filled or improved, those
+    /// of both checkerboard colors together counted once.
     pub(super) fn work(&self, pixels: u64) -> u64 {
         let passes = 1 + 2 * u64::from(self.iterations());
         pixels * passes * u64::from(self.scale.food_sources) / 2

@@ -1,4 +1,4 @@
-//! The estimate of one view between two stages. Its type says which stage it has passed.
+//! The estimate of one view between two stages. Its type parameter is the stage that it has passed.
 
 use super::context::RunContext;
 use super::cycle::{CycleRecord, Place};
@@ -36,7 +36,8 @@ pub struct Searched {
 #[derive(Debug, Clone)]
 pub struct Unpublished;
 
-/// Checked in a cycle, filtered and published: carries the verdicts, and the validated surface as other views read it.
+/// Checked in a cycle, filtered and published: has the verdicts, and the validated surface that other views
+/// read.
 #[derive(Debug, Clone)]
 pub struct Checked {
     pub(super) surface: Vec<CompactPlane>,
@@ -60,14 +61,15 @@ pub enum EstimateRef<'a> {
     Checked(&'a ViewEstimate<Checked>),
 }
 
-/// The maps of a view that the host brings, to start from or to check others against.
+/// The maps of a view that the host provides, as the start of a search or the reference of a check.
 #[derive(Debug, Clone, Copy)]
 pub struct OwnMaps<'a> {
     /// Depth and normal of every pixel on the cycle's scale.
     pub maps: &'a Maps,
     /// Which planes count as validated; `None` validates all that have a depth.
     pub validated: Option<&'a [bool]>,
-    /// Cost of each plane, which ranks what is propagated to other views and is kept to a 256th; `None` is 0.
+    /// Cost of each plane, by which planes propagated to other views are ranked; stored with a relative error
+    /// of at most 1/256. `None` is 0.
     pub cost: Option<&'a [f32]>,
 }
 
@@ -92,7 +94,7 @@ impl<S> ViewEstimate<S> {
         maps_of(&self.map.planes)
     }
 
-    /// Aggregated cost of every pixel's plane, to a 256th.
+    /// Aggregated cost of every pixel's plane, with a relative error of at most 1/256.
     pub fn cost(&self) -> impl ExactSizeIterator<Item = f32> + '_ {
         self.map.planes.iter().map(|plane| plane.cost.into())
     }
@@ -119,7 +121,7 @@ impl<S> ViewEstimate<S> {
 }
 
 impl ViewEstimate<Searched> {
-    /// The source views that each pixel is checked against, along the view's source list.
+    /// The source views that each pixel is checked against, as indices into the view's source list.
     pub fn view_sets(&self) -> &ViewSets {
         &self.stage.view_sets
     }
@@ -134,7 +136,8 @@ impl ViewEstimate<Checked> {
         Ok(ViewEstimate { at, map, counts, cycles, stage: Checked { surface } })
     }
 
-    /// For every pixel the number of source views consistent with its plane, at most 255, and whether that validates it.
+    /// For every pixel the number of source views consistent with its plane, at most 255, and whether that
+    /// validates it.
     pub fn verdicts(&self) -> impl ExactSizeIterator<Item = (u8, bool)> + '_ {
         self.map.planes.iter().map(|plane| (plane.consistent_views, plane.validated))
     }
@@ -179,7 +182,7 @@ impl AnyEstimate {
         either!(self, estimate => estimate.maps())
     }
 
-    /// Aggregated cost of every pixel's plane, to a 256th.
+    /// Aggregated cost of every pixel's plane, with a relative error of at most 1/256.
     pub fn cost(&self) -> Vec<f32> {
         either!(self, estimate => estimate.cost().collect())
     }
@@ -257,7 +260,7 @@ impl<'a> From<&'a AnyEstimate> for EstimateRef<'a> {
     }
 }
 
-/// The host's maps as planes.
+/// Converts the host's maps to planes.
 fn plane_map(context: &RunContext, at: Place, own: &OwnMaps) -> Result<PlaneMap> {
     let camera = &context.scaled(at).camera;
     let grid = camera.grid();
@@ -303,12 +306,12 @@ fn plane_map(context: &RunContext, at: Place, own: &OwnMaps) -> Result<PlaneMap>
     Ok(PlaneMap { planes })
 }
 
-/// Whether a normal is a unit vector as far as files and f32 keep it one.
+/// Whether a normal is a unit vector within the precision of files and f32.
 pub(super) fn is_unit(normal: Vec3) -> bool {
     (normal.length() - 1.0).abs() < 1e-2
 }
 
-/// Depth and normal of every plane; on one thread, as hosts ask for them outside any pool.
+/// Depth and normal of every plane; on one thread, since hosts call this outside of any pool.
 pub(super) fn maps_of(planes: &[PixelEstimate]) -> Maps {
     Maps {
         depth: planes.iter().map(|plane| plane.depth).collect(),

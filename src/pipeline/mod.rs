@@ -1,8 +1,8 @@
 //! A run, stage by stage (section 3 of the paper and beyond).
 //!
-//! What a stage changes is in its name and signature, and what it reads of other views is in the types of its inputs: checked
-//! planes, searched planes, or published surfaces. A stage of one view needs nothing else of other views: it can run in this
-//! process or in another, from memory or from files.
+//! What a stage changes is in its name and signature, and what it reads of other views is in the types of its
+//! inputs: checked planes, searched planes, or published surfaces. A stage of one view needs nothing else of
+//! other views: it can run in this process or in another, from memory or from files.
 
 mod context;
 mod cycle;
@@ -31,13 +31,15 @@ use stages::SearchInput;
 pub use stepper::Stepper;
 use store::Store;
 
-/// Estimates depth, normal and view set of every pixel of every view, and fuses the validated ones into points.
+/// Estimates depth, normal and view set of every pixel of every view, and fuses the validated ones into
+/// points.
 ///
-/// Runs on a thread pool of its own, joined before it returns; may be called from several threads at once. The same
-/// scene, options and crate version give the same bits for any number of threads and any instruction set.
+/// Runs on a thread pool of its own, joined before it returns; may be called from several threads at once.
+/// The same scene, options and crate version give the same bits for any number of threads and any instruction
+/// set.
 ///
 /// # Errors
-/// An option out of its range, named; [`crate::Error::Cancelled`] when `progress` breaks.
+/// An option out of its range, named; [`crate::Error::Cancelled`] when `progress` returns `Break`.
 pub fn reconstruct(scene: &Scene, options: &Options, progress: ProgressFn) -> Result<Reconstruction> {
     options.check()?;
     JoinedPool::new(options.threads)?.install(|| run(scene, options, progress))
@@ -62,7 +64,8 @@ fn run(scene: &Scene, options: &Options, report: ProgressFn) -> Result<Reconstru
     Ok(Reconstruction { views, points, warnings })
 }
 
-/// One cycle: every view is searched from the estimates of the cycle before, then all are checked against each other.
+/// One cycle: every view is searched from the estimates of the cycle before, then all are checked against
+/// each other.
 fn run_cycle(
     context: &RunContext,
     cycle: usize,
@@ -81,7 +84,7 @@ fn run_cycle(
         stages::propagate(context, at(view), own.as_ref(), &donors, &|units| searching(view, units))
     })?;
 
-    // Reads the surfaces that the sources published. A view's own planes go as soon as it is searched.
+    // Reads the surfaces that the sources published. A view's own planes are freed as soon as it is searched.
     let (previous, surfaces) = previous.take_surfaces();
     let searched = previous.zip(candidates).map(|view, (own, candidates)| {
         let problem = context.problem(at(view), surfaces.of_sources(context.sources(view)));
@@ -99,7 +102,7 @@ fn run_cycle(
         stages::check(context, own, sources, &|units| checking(view, units))
     })?;
 
-    // Every view by itself.
+    // Each view independently.
     searched.zip(verdicts).map(|_, (own, verdicts)| {
         let mut checked = stages::apply_check(own, &verdicts);
         stages::correct_fattening(context, &mut checked);
@@ -118,7 +121,8 @@ fn finish(
     let advance = |view, units| tracker.advance(units, context.progress(Phase::Check, at(view)));
     let estimates = estimates.all_known();
 
-    // Reads the surfaces that the sources published and, for the recheck, their planes as they were before averaging.
+    // Reads the surfaces that the sources published and, for the recheck, their planes as they were before
+    // averaging.
     let filled = estimates.map_ref(|view, own| {
         let problem = context.problem(at(view), estimates.surfaces_of_sources(context.sources(view)));
         let averaged = stages::average_across_views(context, &problem, own);
@@ -127,8 +131,8 @@ fn finish(
         stages::recheck(context, &problem, filled, sources, &|units| advance(view, units))
     })?;
 
-    // Reads the surfaces that the sources published. Averages once more: the averaged planes of all views, kept since their
-    // gaps were filled, would take half as much memory again.
+    // Reads the surfaces that the sources published. Repeats the averaging: to keep the averaged planes of
+    // all views since gap filling would take half as much memory again.
     let (estimates, surfaces) = estimates.take_surfaces();
     let results = estimates.zip(filled).map(|view, (own, filled)| {
         let problem = context.problem(at(view), surfaces.of_sources(context.sources(view)));

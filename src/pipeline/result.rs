@@ -15,9 +15,9 @@ pub struct ViewResult {
     pub raw: Maps,
     /// Mean `1 - NCC` of the raw plane over the pixel's view set, 0 to 2; lower is more certain.
     pub cost: Vec<f32>,
-    /// Whether each pixel is validated, or why not.
+    /// The status of each pixel: validated, or the reason why it is not.
     pub status: Vec<PixelStatus>,
-    /// The view's source views, as indices into the scene; `view_sets` counts along this list.
+    /// The view's source views, as indices into the scene; `view_sets` indexes this list.
     pub sources: Vec<u32>,
     /// The view set of each pixel: the source views that see its raw plane.
     pub view_sets: ViewSets,
@@ -62,6 +62,6 @@ pub struct Reconstruction {
     pub views: Vec<ViewResult>,
     /// The fused cloud.
     pub points: PointCloud,
-    /// What the user should know about the run, in sentences.
+    /// Warnings about the run, as sentences.
     pub warnings: Vec<String>,
 }

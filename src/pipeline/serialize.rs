@@ -1,14 +1,15 @@
-//! Estimates as bytes, for a scheduler that sends them from machine to machine or keeps them across a restart.
+//! Estimates as bytes, for a scheduler that sends them between machines or saves them across a restart.
 //!
 //! ```text
 //! magic, version   8 bytes
 //! header           view, cycle, stage (0 searched, 1 checked), pixels, words of a view set, records: u64
 //! counts           ncc_evaluations, bilinear_samples, early_terminations: u64
 //! records          downscale, cycle, pixels, changed, validated: u64, one for each cycle so far
-//! pixels           depth, normal x y z, cost: f32; consistent views, validated: u8; view set: u32 words (searched only)
+//! pixels           depth, normal x y z, cost: f32; consistent views, validated: u8;
+//!                  view set: u32 words (searched only)
 //! ```
 //!
-//! All numbers are little-endian. The published surface of a checked estimate is made from its planes.
+//! All numbers are little-endian. The published surface of a checked estimate is recomputed from its planes.
 
 use super::cycle::{CycleRecord, Place};
 use super::estimate::{AnyEstimate, Checked, Searched, ViewEstimate, is_unit};
@@ -25,9 +26,9 @@ const MAGIC: [u8; 8] = *b"skepst\0\x02";
 const HEADER: usize = 9;
 /// Numbers of a record.
 const RECORD: usize = 5;
-/// Bytes of a pixel but for its view set.
+/// Bytes of a pixel without its view set.
 const PIXEL: usize = 22;
-/// The stages as the header names them.
+/// The codes of the stages in the header.
 const SEARCHED: u64 = 0;
 const CHECKED: u64 = 1;
 
@@ -89,19 +90,21 @@ fn to_bytes<S>(estimate: &ViewEstimate<S>, stage: u64, view_sets: Option<&ViewSe
 }
 
 impl AnyEstimate {
-    /// The estimate that gave these bytes.
+    /// Reads an estimate from its bytes.
     ///
     /// # Errors
-    /// Bytes that are no estimate, or were cut; an estimate of another scene or other options as far as that shows: a view,
-    /// cycle or size that does not exist; values that no search can have found.
+    /// Bytes that are not an estimate or are truncated; an estimate of another scene or other options where
+    /// this is detectable: a view, cycle or size that does not exist; values that are not valid in an
+    /// estimate.
     pub fn from_bytes(stepper: &Stepper, bytes: &[u8]) -> Result<AnyEstimate> {
         let mut reader = Reader { rest: bytes };
         if reader.take::<8>() != Some(MAGIC) {
-            return Err(error("no estimate", "bytes that an estimate of this version was saved to"));
+            return Err(error("not an estimate of this version", "bytes saved by this version"));
         }
         let mut header = [0; HEADER];
         for number in &mut header {
-            *number = reader.u64().ok_or_else(|| error("cut in the header", "all bytes"))?;
+            *number =
+                reader.u64().ok_or_else(|| error("truncated in the header", "all bytes of an estimate"))?;
         }
         let [
             view,
@@ -118,7 +121,10 @@ impl AnyEstimate {
             [view, cycle, pixels, words, records].map(|number| usize::try_from(number).unwrap_or(usize::MAX));
         let at = Place { cycle, view };
         let (width, height) = stepper.size(cycle, view).map_err(|reason| {
-            error(format!("an estimate of view {view} in cycle {cycle}"), format!("another: {reason}"))
+            error(
+                format!("an estimate of view {view} in cycle {cycle}"),
+                format!("one of this stepper ({reason})"),
+            )
         })?;
         let sources = stepper.sources(view).len();
         let expected_words =
@@ -132,14 +138,14 @@ impl AnyEstimate {
             let expected = format!("{} bytes", byte_len(pixels, words, records.min(most_records)));
             return Err(error(format!("{} bytes", bytes.len()), expected));
         }
-        // The length was checked: none of what follows can be missing.
+        // The length was checked: none of the reads below fails.
         let cycles = (0..records).map(|_| reader.record()).collect::<Result<_>>()?;
         let mut view_sets = ViewSets::empty(pixels, sources);
         let mut planes = Vec::with_capacity(pixels);
         for pixel in 0..pixels {
             planes.push(reader.plane().ok_or_else(|| {
                 let place = format!("column {}, row {}", pixel % width as usize, pixel / width as usize);
-                error(format!("a plane that no search can find at {place}"), "whole bytes")
+                error(format!("an estimate with an invalid plane at {place}"), "undamaged bytes")
             })?);
             for word in 0..words {
                 let bits = u32::from_le_bytes(reader.take().unwrap_or([0; 4]));
@@ -170,7 +176,7 @@ fn byte_len(pixels: usize, words: usize, records: usize) -> usize {
     header.saturating_add(records).saturating_add(pixels.saturating_mul(PIXEL + 4 * words))
 }
 
-/// Takes numbers off the front of bytes.
+/// Reads numbers from the front of a byte slice.
 struct Reader<'a> {
     rest: &'a [u8],
 }
@@ -195,14 +201,14 @@ impl Reader<'_> {
         // No scale has more pixels, so that sums of these never overflow.
         let most = u64::from(Camera::MAX_SIDE).pow(2);
         if record.iter().any(|&number| number > most) {
-            return Err(error(format!("a cycle of {record:?}"), "what a search can report"));
+            return Err(error(format!("a cycle of {record:?}"), "numbers of pixels in an image"));
         }
         let [downscale, cycle, pixels, changed, validated] = record;
         let (downscale, cycle) = (downscale as u32, cycle as u32);
         Ok(CycleRecord { downscale, cycle, pixels, changed, validated })
     }
 
-    /// A pixel's plane, `None` for one that no search can find.
+    /// A pixel's plane, `None` if its values are invalid.
     fn plane(&mut self) -> Option<PixelEstimate> {
         let [depth, x, y, z, cost] = [(); 5].map(|()| self.f32().unwrap_or(0.0));
         let [consistent_views, validated] = self.take::<2>().unwrap_or([0; 2]);

@@ -3,11 +3,12 @@
 use crate::scene::{CompactPlane, PixelEstimate};
 use std::marker::PhantomData;
 
-/// The surfaces that the sources of a view published after a check, in the order of its source list; empty where nothing is
-/// known.
+/// The surfaces that the sources of a view published after a check, in the order of its source list; empty
+/// where nothing is known.
 pub struct PublishedSurfaces<'a>(pub Vec<&'a [CompactPlane]>);
 
-/// The planes of the sources of a view after the stage `S`, in the order of its source list; empty where nothing is known.
+/// The planes of the sources of a view after the stage `S`, in the order of its source list; empty where
+/// nothing is known.
 pub struct SourcePlanes<'a, S> {
     planes: Vec<&'a [PixelEstimate]>,
     stage: PhantomData<S>,

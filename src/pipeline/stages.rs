@@ -1,5 +1,5 @@
-//! The stages of a run, one function each: what it reads are its arguments, what it changes is what it returns or takes by
-//! `&mut`. The order is in [`pipeline`](super).
+//! The stages of a run, one function each: what it reads are its arguments, what it changes is what it
+//! returns or takes by `&mut`. The order is in [`pipeline`](super).
 
 use super::context::RunContext;
 use super::cycle::{CycleRecord, Place};
@@ -25,7 +25,8 @@ use crate::scene::{PixelEstimate, PlaneMap, ScaledView, Scene, Verdict};
 use crate::view_selection::{ViewRules, select_sets};
 use rayon::prelude::*;
 
-/// The planes that other views propagate to the pixels of a view; none in a scale's first cycle or with propagation off.
+/// The planes that other views propagate to the pixels of a view; none in a scale's first cycle or with
+/// propagation off.
 #[derive(Debug, Clone)]
 pub struct Candidates {
     pub(super) at: Place,
@@ -47,8 +48,8 @@ impl Candidates {
     }
 }
 
-/// Takes an estimate to the scale of a cycle: each pixel gets the plane of its coarse pixel. One that is on that scale already
-/// stays as it is.
+/// Upsamples an estimate to the scale of a cycle: each pixel gets the plane of its coarse pixel. An estimate
+/// that is already on that scale is unchanged.
 pub fn upsample(
     context: &RunContext,
     at: Place,
@@ -68,8 +69,8 @@ pub fn upsampled(context: &RunContext, at: Place, own: &ViewEstimate<Checked>) -
     ViewEstimate { at, map, counts: own.counts, cycles: own.cycles.clone(), stage: Checked { surface } }
 }
 
-/// The candidates for the pixels of a view without a validated plane: the consistent planes of the views that have it among
-/// their sources (section 5.6.1 of the paper).
+/// The candidates for the pixels of a view without a validated plane: the consistent planes of the views that
+/// have it among their sources (section 5.6.1 of the paper).
 pub fn propagate(
     context: &RunContext,
     at: Place,
@@ -90,7 +91,7 @@ pub fn propagate(
     Ok(Candidates { at, pixels: camera.pixels(), planes })
 }
 
-/// What a search starts from, besides the published surfaces of the sources.
+/// The input of a search besides the published surfaces of the sources.
 #[derive(Clone, Copy)]
 pub struct SearchInput<'a> {
     /// The view's own estimate of the cycle before, on this scale; `None` starts at random.
@@ -142,8 +143,8 @@ pub fn search(
     })
 }
 
-/// Fills textureless regions from the planes around them; determines the view sets of the filled pixels. Reads the images
-/// and the published surfaces of the sources.
+/// Fills textureless regions from the planes around them; determines the view sets of the filled pixels.
+/// Reads the images and the published surfaces of the sources.
 pub fn fill_textureless(
     context: &RunContext,
     problem: &Problem,
@@ -210,15 +211,15 @@ pub fn check(
     check.run()
 }
 
-/// Writes the verdicts of a check into the planes they were made for.
+/// Writes the verdicts of a check into the checked planes.
 pub fn apply_check(own: ViewEstimate<Searched>, verdicts: &[Verdict]) -> ViewEstimate<Unpublished> {
     let (mut checked, _) = own.into_stage(Unpublished);
     checked.map.set_verdicts(verdicts);
     checked
 }
 
-/// Corrects foreground fattening where the scale may end, as far as the view knows: changes depths and normals of validated
-/// pixels at edges; in the last cycle some lose their validation.
+/// Corrects foreground fattening where the scale may end, as far as the view knows: changes depths and
+/// normals of validated pixels at edges; in the last cycle some lose their validation.
 pub fn correct_fattening(context: &RunContext, own: &mut ViewEstimate<Unpublished>) {
     if context.may_end_scale(own.cycle(), own.cycles().last()) {
         let filter = CorrectFattening {
@@ -278,8 +279,8 @@ pub fn fill_gaps(context: &RunContext, at: Place, averaged: &[PixelEstimate]) ->
     FilledGaps(filled.into_iter().map(|pixel| (pixel, planes[pixel as usize])).collect())
 }
 
-/// Those of the filled planes that the planes of the sources, as they were before averaging, validate more closely than the
-/// check asks for.
+/// The filled planes that are consistent with the planes of the sources before averaging, within tighter
+/// tolerances than those of the check.
 pub fn recheck(
     context: &RunContext,
     problem: &Problem,
@@ -314,7 +315,8 @@ pub fn recheck(
     Ok(FilledGaps(confirmed.collect()))
 }
 
-/// Determines view set, confidence and status of every pixel. Reads images and published surfaces of the sources.
+/// Determines view set, confidence and status of every pixel. Reads images and published surfaces of the
+/// sources.
 pub fn classify(
     context: &RunContext,
     problem: &Problem,
@@ -326,7 +328,7 @@ pub fn classify(
         problem,
         window: context.window(own.cycle()),
         cost: CostRules::new(&context.options, false),
-        // A set that falls back to all views would hide that none sees the plane.
+        // A set that falls back to all views would hide that the plane is not visible in any.
         view_set: ViewRules::new(&context.options, 0),
         level: context.level,
         advance,
@@ -348,8 +350,8 @@ pub fn classify(
     })
 }
 
-/// Fuses the validated pixels of all views into points (section 6 of the paper). Reads the results of the views that saw a
-/// sparse point together with a view.
+/// Fuses the validated pixels of all views into points (section 6 of the paper). Reads the results of the
+/// views that share a sparse point with a view.
 pub fn fuse(
     scene: &Scene,
     options: &Options,

@@ -1,10 +1,10 @@
-//! The status of every pixel: validated, or the reason why not, so that an empty cloud explains itself.
+//! The status of every pixel: validated, or the reason why not, which explains an empty cloud.
 
 use crate::ambc::Confidence;
 use crate::geometry::SearchRange;
 use crate::scene::{PixelEstimate, PixelStatus, ScaledView};
 
-/// Relative distance to an end of the depth range within which a depth counts as stopped by it.
+/// Relative distance to an end of the depth range within which a depth counts as limited by it.
 const AT_RANGE_END: f32 = 1e-3;
 
 /// The status of each pixel of a view; a plane must be visible in `min_views` source views to be validated.
@@ -71,7 +71,7 @@ mod tests {
             (0..if pixel == 7 { 1 } else { 2 }).for_each(|source| sets.insert(pixel, source));
         }
         (confidence.view_sets, expected[7]) = (sets, PixelStatus::NoSources);
-        // Validated is validated, whatever else.
+        // Validated takes precedence over all reasons.
         (map.planes[8].validated, expected[8]) = (true, PixelStatus::Validated);
         confidence.has_texture[8] = false;
 
@@ -82,7 +82,7 @@ mod tests {
             range: RANGE,
         };
         assert_eq!(classify(&view, &map.planes, &confidence, 2), expected);
-        // With a single source no pixel can be validated: that is the reason.
+        // With a single source no pixel can be validated, for this reason.
         map.planes.iter_mut().for_each(|plane| plane.validated = false);
         let alone = classify(&view, &map.planes, &Confidence { sources: 1, ..confidence }, 2);
         assert!(alone[0] == PixelStatus::Masked && alone[1..].iter().all(|&o| o == PixelStatus::NoSources));

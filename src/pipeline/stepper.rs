@@ -1,4 +1,4 @@
-//! A run taken apart: the public stepwise interface. Checks what the host passes and calls the stages.
+//! The public stepwise interface: checks the arguments and calls the stages.
 
 use super::context::RunContext;
 use super::cycle::{Cycle, Place};
@@ -12,24 +12,25 @@ use crate::options::Options;
 use crate::parallel::{Phase, ProgressFn};
 use crate::scene::Scene;
 
-/// A run taken apart, for hosts that schedule views themselves, on this machine or on many, or bring maps of their own.
+/// A run stage by stage, for hosts that schedule views themselves, on one machine or many, or provide maps of
+/// their own.
 ///
 /// A run is, for each cycle from [`Stepper::cycles`]:
 ///
 /// 1. [`upsample`](Stepper::upsample) the estimates when the cycle is on a finer scale;
-/// 2. [`propagate`](Stepper::propagate) to and [`search`](Stepper::search) every view, from the checked estimates of the cycle
-///    before;
+/// 2. [`propagate`](Stepper::propagate) to and [`search`](Stepper::search) every view, from the checked
+///    estimates of the cycle before;
 /// 3. [`check`](Stepper::check) every view against the searched estimates of this cycle;
-/// 4. ask [`next`](Stepper::next) for the next cycle.
+/// 4. call [`next`](Stepper::next) for the next cycle.
 ///
-/// After the last, [`finish`](Stepper::finish) every view and fuse. Done so for all views, that gives the same bits as
-/// [`reconstruct`](crate::reconstruct).
+/// After the last, [`finish`](Stepper::finish) every view and fuse. For all views, this gives the same bits
+/// as [`reconstruct`](crate::reconstruct).
 ///
-/// The estimates of other views are passed as one entry for each view of the scene; `None` says that nothing is known of a
-/// view. Each call reads only those that its documentation names.
+/// The estimates of other views are passed as one entry for each view of the scene; `None` where a view has
+/// no estimate. Each call reads only the entries that its documentation names.
 ///
-/// Nothing here changes after it is made: calls for different views may run at the same time from several threads. They run
-/// on the rayon pool they are called on.
+/// A stepper is immutable: calls for different views may run concurrently from several threads. They run on
+/// the rayon pool of the caller.
 pub struct Stepper(RunContext);
 
 /// One entry for each view of the scene.
@@ -54,12 +55,12 @@ impl Stepper {
         self.0.views()
     }
 
-    /// The source views of a view, along which its view sets count.
+    /// The source views of a view, which its view sets index.
     pub fn sources(&self, view: usize) -> &[u32] {
         self.0.sources(view)
     }
 
-    /// What the user should know about the choice of source views, in sentences.
+    /// Warnings about the selection of source views, as sentences.
     pub fn warnings(&self) -> &[String] {
         self.0.warnings()
     }
@@ -75,11 +76,12 @@ impl Stepper {
         Ok((camera.width, camera.height))
     }
 
-    /// The checked estimate of a view on the scale of `cycle`, the next finer one: each pixel gets the plane of its coarse
-    /// pixel. Reads the view alone.
+    /// The checked estimate of a view on the scale of `cycle`, the next finer one: each pixel gets the plane
+    /// of its coarse pixel. Reads this view only.
     ///
     /// # Errors
-    /// A cycle that does not exist; an estimate that is not of the scale before that of `cycle`, or of another scene.
+    /// A cycle that does not exist; an estimate that is not of the scale before that of `cycle`, or of
+    /// another scene.
     pub fn upsample(&self, cycle: usize, estimate: &ViewEstimate<Checked>) -> Result<ViewEstimate<Checked>> {
         let at = Place { cycle, view: estimate.view() };
         self.0.check_place(at)?;
@@ -94,12 +96,12 @@ impl Stepper {
         Ok(stages::upsampled(&self.0, at, estimate))
     }
 
-    /// The candidates for the pixels of a view that have no validated plane: the consistent planes of other views. None in a
-    /// scale's first cycle. Reads the checked planes of the view itself and of the views that have it among their sources, on
-    /// the scale of the cycle.
+    /// The candidates for the pixels of a view that have no validated plane: the consistent planes of other
+    /// views. None in a scale's first cycle. Reads the checked planes of the view itself and of the views
+    /// that have it among their sources, on the scale of the cycle.
     ///
     /// # Errors
-    /// A cycle or view that does not exist; estimates of another scale, scene or view than their place says.
+    /// A cycle or view that does not exist; estimates whose scale, scene or view does not match their entry.
     pub fn propagate(&self, cycle: usize, view: usize, estimates: Known<Checked>) -> Result<Candidates> {
         let at = Place { cycle, view };
         self.check_estimates(at, estimates)?;
@@ -108,11 +110,13 @@ impl Stepper {
         stages::propagate(&self.0, at, known(view), &donors, &|_| Ok(()))
     }
 
-    /// Searches the planes of a view and fills its textureless regions. Starts from the view's own checked estimate, where one
-    /// is given, else at random; reads the published surfaces of the view's sources and the candidates.
+    /// Searches the planes of a view and fills its textureless regions. Starts from the view's own checked
+    /// estimate, where one is given, else at random; reads the published surfaces of the view's sources and
+    /// the candidates.
     ///
     /// # Errors
-    /// What [`Stepper::propagate`] refuses; candidates of another view or cycle; [`Error::Cancelled`] when `progress` breaks.
+    /// The errors of [`Stepper::propagate`]; candidates of another view or cycle; [`Error::Cancelled`] when
+    /// `progress` returns `Break`.
     pub fn search(
         &self,
         cycle: usize,
@@ -143,13 +147,14 @@ impl Stepper {
         Ok(stages::record_search(&self.0, own, searched))
     }
 
-    /// Checks the planes of a view against those of its sources, then corrects foreground fattening (where the scale may end
-    /// with this cycle), smooths the validated planes and publishes them: depths, normals and verdicts differ from those of
-    /// the searched estimate. Reads the searched planes of the view's sources in the same cycle, or maps of the host's own
-    /// for them; a source that is not known counts neither for nor against a plane.
+    /// Checks the planes of a view against those of its sources, then corrects foreground fattening (where
+    /// the scale may end with this cycle), smooths the validated planes and publishes them: depths, normals
+    /// and verdicts differ from those of the searched estimate. Reads the searched planes of the view's
+    /// sources in the same cycle, or maps of the host for them; a source without an estimate counts neither
+    /// for nor against a plane.
     ///
     /// # Errors
-    /// An estimate or a source of another scale, scene or view than its place says.
+    /// An estimate or a source whose scale, scene or view does not match its entry.
     pub fn check(
         &self,
         own: &ViewEstimate<Searched>,
@@ -166,8 +171,9 @@ impl Stepper {
         Ok(stages::publish(&self.0, checked))
     }
 
-    /// The cycle to do after this one was done for all views; `None` after the last. A scale ends early once few enough of
-    /// the pixels of the given estimates changed (option `schedule.min_changed_fraction`).
+    /// The cycle that follows this one; `None` after the last. Call it after this cycle is finished for all
+    /// views. A scale ends early once the fraction of changed pixels of the given estimates is below the
+    /// option `schedule.min_changed_fraction`.
     ///
     /// # Errors
     /// A cycle that does not exist; estimates of another scale.
@@ -178,13 +184,13 @@ impl Stepper {
             .next_cycle(cycle, estimates.iter().copied().flatten().filter_map(|own| own.cycles().last())))
     }
 
-    /// The result of a view after the last cycle: averages validated planes across views, fills small gaps where the sources
-    /// confirm them, and determines view set, confidence and status of every pixel. Reads the published surfaces of the
-    /// view's sources, and their checked planes.
+    /// The result of a view after the last cycle: averages validated planes across views, fills small gaps
+    /// where the sources confirm them, and determines view set, confidence and status of every pixel. Reads
+    /// the published surfaces of the view's sources, and their checked planes.
     ///
     /// # Errors
-    /// A view that does not exist; estimates that are not of full size, or of another scene or view than their place says; no
-    /// estimate of the view itself; [`Error::Cancelled`] when `progress` breaks.
+    /// A view that does not exist; estimates that are not of full size, or whose scene or view does not match
+    /// their entry; no estimate of the view itself; [`Error::Cancelled`] when `progress` returns `Break`.
     pub fn finish(&self, view: usize, estimates: Known<Checked>, progress: ProgressFn) -> Result<ViewResult> {
         let at = Place { cycle: self.cycles().len() - 1, view };
         self.check_estimates(at, estimates)?;
@@ -213,7 +219,7 @@ impl Stepper {
         PublishedSurfaces::new(self.sources(view), surface)
     }
 
-    /// Refuses sources of a check that are of other views or scales than their places say.
+    /// Returns an error for sources of a check whose view or scale does not match their entry.
     pub(crate) fn check_sources(&self, at: Place, sources: &[Option<EstimateRef>]) -> Result<()> {
         self.0.check_place(at)?;
         self.check_count(sources.len())?;
@@ -228,7 +234,7 @@ impl Stepper {
         Ok(())
     }
 
-    /// Refuses estimates of other views or scales than their places say.
+    /// Returns an error for estimates whose view or scale does not match their entry.
     fn check_estimates<S>(&self, at: Place, estimates: Known<S>) -> Result<()> {
         self.0.check_place(at)?;
         self.check_count(estimates.len())?;
@@ -262,7 +268,7 @@ impl Stepper {
         self.check_size(cycle, found, name)
     }
 
-    /// Refuses an estimate that is not of the scale of a cycle.
+    /// Returns an error for an estimate that is not of the scale of a cycle.
     fn check_size<S>(&self, cycle: usize, found: &ViewEstimate<S>, name: &str) -> Result<()> {
         let (width, height) = self.size(cycle, found.view())?;
         let scale = |cycle: usize| self.cycles().get(cycle).map(|cycle| cycle.scale_index);
@@ -272,8 +278,8 @@ impl Stepper {
         }
         let value = format!("one of cycle {} with {} pixels", found.cycle(), found.pixels());
         let expected = format!(
-            "one on the scale of cycle {cycle}, {width}x{height} pixels, of the same scene and options; estimates of the \
-             next coarser scale are upsampled first"
+            "one on the scale of cycle {cycle}, {width}x{height} pixels, of the same scene and options; \
+             estimates of the next coarser scale are upsampled first"
         );
         Err(Error::argument(name, value, expected))
     }
@@ -283,9 +289,9 @@ impl ViewEstimate<Checked> {
     /// The estimate of a view whose maps the host brings, as if it had been checked in this cycle.
     ///
     /// # Errors
-    /// A cycle or view that does not exist; maps of another size than the view has in the cycle; a depth that is negative
-    /// or not finite; a normal that is not unit or turned away from the camera where there is a depth; a cost that is
-    /// negative or not a number.
+    /// A cycle or view that does not exist; maps of another size than the view has in the cycle; a depth that
+    /// is negative or not finite; a normal that is not unit or turned away from the camera where there is a
+    /// depth; a cost that is negative or not a number.
     pub fn from_maps(stepper: &Stepper, cycle: usize, view: usize, own: &OwnMaps) -> Result<Self> {
         ViewEstimate::of_maps(&stepper.0, Place { cycle, view }, own)
     }

@@ -17,15 +17,15 @@ pub struct SurfaceStore(Vec<Vec<CompactPlane>>);
 const THREADS_PER_VIEW: usize = 4;
 
 impl SurfaceStore {
-    /// Those of a view's sources.
+    /// The surfaces of a view's sources.
     pub fn of_sources(&self, sources: &[u32]) -> PublishedSurfaces<'_> {
         PublishedSurfaces::new(sources, |source| &self.0[source])
     }
 }
 
 impl<T: Send> Store<T> {
-    /// Does the same for all views, some at a time: the threads share the work on one view, and while there is not enough of
-    /// it for all of them they work on another one. More views at a time would take more memory.
+    /// Runs a stage for all views, a few at a time: the threads share the work of a view, and those without
+    /// work in it take that of another one. The limit on concurrent views bounds the memory.
     pub fn map<R: Send>(self, stage: impl Fn(usize, T) -> Result<R> + Sync) -> Result<Store<R>> {
         let at_a_time = 1 + (rayon::current_num_threads() + THREADS_PER_VIEW / 2) / THREADS_PER_VIEW;
         let mut turns: Vec<Vec<(usize, T)>> = (0..at_a_time).map(|_| Vec::new()).collect();
@@ -41,7 +41,7 @@ impl<T: Send> Store<T> {
         Ok(Store(done.into_iter().map(|(_, result)| result).collect()))
     }
 
-    /// The same with the values of all views kept.
+    /// Like `map`, but keeps the values of all views.
     pub fn map_ref<R: Send>(&self, stage: impl Fn(usize, &T) -> Result<R> + Sync) -> Result<Store<R>>
     where
         T: Sync,
@@ -61,7 +61,7 @@ impl<T: Send> Store<T> {
 }
 
 impl Store<Option<ViewEstimate<Checked>>> {
-    /// Before the first cycle.
+    /// No estimates, as before the first cycle.
     pub fn unknown(views: usize) -> Self {
         Store((0..views).map(|_| None).collect())
     }
@@ -71,7 +71,7 @@ impl Store<Option<ViewEstimate<Checked>>> {
         self.0.iter().flatten().filter_map(|own| own.cycles().last())
     }
 
-    /// After the first cycle all are known.
+    /// The estimates of all views, which exist after the first cycle.
     pub fn all_known(self) -> Store<ViewEstimate<Checked>> {
         Store(self.0.into_iter().flatten().collect())
     }

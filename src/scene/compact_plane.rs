@@ -2,9 +2,9 @@
 
 use crate::geometry::SlantedPlane;
 
-/// A validated plane as other views look it up: a [`SlantedPlane`] in eight bytes, so that more of them stay in cache.
-/// Slopes have the upper half of an f32's bits, a relative error of 2^-9 at most: half a pixel away that is less than a
-/// millionth of most depths.
+/// A validated plane as other views read it: a [`SlantedPlane`] in eight bytes, so that more of them stay in
+/// cache. Slopes are rounded to the upper 16 bits of an f32, a relative error of at most 2^-9: half a pixel
+/// away that is less than a millionth of most depths.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CompactPlane {
     /// 0 where nothing is validated.
@@ -29,7 +29,7 @@ impl CompactPlane {
 
 impl From<SlantedPlane> for CompactPlane {
     fn from(plane: SlantedPlane) -> CompactPlane {
-        // To the nearest; the slopes of planes that face the camera are far from the largest f32.
+        // Rounds to nearest; the slopes of planes that face the camera are far from the largest f32.
         let upper_half = |slope: f32| slope.to_bits().saturating_add(0x8000) >> 16;
         let slopes = upper_half(plane.slope_x) << 16 | upper_half(plane.slope_y);
         CompactPlane { inverse_depth: plane.inverse_depth, slopes }

@@ -9,26 +9,26 @@ pub struct Maps {
     pub normal: Vec<[f32; 3]>,
 }
 
-/// What became of a pixel, and the reason when it has no validated solution.
+/// Status of a pixel: validated, or the reason why it is not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum PixelStatus {
-    /// The solution is consistent with enough source views.
+    /// The plane is consistent with enough source views.
     Validated,
-    /// The mask leaves the pixel out.
+    /// The mask excludes the pixel.
     Masked,
-    /// The window around the pixel is too uniform to be matched.
+    /// The variance in the window around the pixel is too small for matching.
     NoTexture,
-    /// Fewer than two source views can see the solution.
+    /// The plane is visible in fewer than two source views.
     NoSources,
-    /// Too few source views agree with the solution.
+    /// Too few source views are consistent with the plane.
     Inconsistent,
-    /// The solution lies at an end of the depth range: the surface may lie beyond.
+    /// The depth is at an end of the depth range: the surface may lie outside of it.
     OutOfRange,
 }
 
 impl PixelStatus {
-    /// All outcomes, in the order of their discriminants.
+    /// All values, in the order of their discriminants.
     pub const ALL: [PixelStatus; 6] = [
         PixelStatus::Validated,
         PixelStatus::Masked,

@@ -1,4 +1,4 @@
-//! What is handed in: views with image, camera, mask and depth range, and sparse points.
+//! The input of a run: views with image, camera, mask and depth range, and sparse points.
 
 mod compact_plane;
 mod maps;
@@ -21,15 +21,15 @@ pub struct View {
     pub name: String,
     /// The photograph, of the camera's size.
     pub picture: Picture,
-    /// Where it was taken from.
+    /// Its calibration and pose.
     pub camera: Camera,
-    /// `true` where a depth is wanted, row by row, one a pixel; `None` wants all. A masked pixel still serves as
-    /// source for other views.
+    /// `true` where a depth is estimated, one value for each pixel, row by row; `None` estimates all. Other
+    /// views are matched with masked pixels too.
     pub mask: Option<Vec<bool>>,
-    /// Where to look for surfaces; `None` takes it from the sparse points.
+    /// The depth range of the search; `None` derives it from the sparse points.
     pub depth_range: Option<DepthRange>,
-    /// The views to match it with, as indices into the scene's views, those that matter most first; `None` chooses them
-    /// by their triangulation angle.
+    /// The views to match it with, as indices into the scene's views, the most important first; `None`
+    /// selects them by triangulation angle.
     pub sources: Option<Vec<u32>>,
 }
 
@@ -42,7 +42,7 @@ pub struct SparsePoint {
     pub views: Vec<u32>,
 }
 
-/// Calibrated photographs, checked.
+/// Calibrated photographs and sparse points, checked.
 #[derive(Debug, Clone)]
 pub struct Scene {
     views: Vec<View>,
@@ -51,16 +51,16 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Checks every view and point and determines each view's depth range: its own, else the 1st to 99th percentile of
-    /// the depths of the sparse points it saw, from three quarters of the one to twice the other.
+    /// Checks every view and point and determines the depth range of each view: its own, else from three
+    /// quarters of the 1st to twice the 99th percentile of the depths of the sparse points it saw.
     ///
     /// # Errors
-    /// Fewer than two views; a name that occurs twice; a picture or mask of another size than its camera; a camera,
-    /// range or point that is not finite or makes no sense; a point or source list that names no view of the scene, or a
-    /// source list that names the view itself or a view twice; a view with neither range nor sparse points.
+    /// Fewer than two views; a name that occurs twice; a picture or mask of another size than its camera; an
+    /// invalid camera, range or point; a point or source list with an index that is no view; a source list
+    /// with the view itself or a view twice; a view with neither range nor sparse points.
     pub fn new(views: Vec<View>, points: Vec<SparsePoint>) -> Result<Scene> {
         if views.len() < 2 {
-            return Err(Error::argument("views", views.len(), "at least 2 views: depth needs another view"));
+            return Err(Error::argument("views", views.len(), "at least 2 views"));
         }
         check_names(&views)?;
         for (index, view) in views.iter().enumerate() {
@@ -90,12 +90,12 @@ impl Scene {
         Ok(Scene { views, points, depth_ranges })
     }
 
-    /// The views and points again, to change them.
+    /// Returns the views and points, to change them.
     pub fn into_parts(self) -> (Vec<View>, Vec<SparsePoint>) {
         (self.views, self.points)
     }
 
-    /// The views in the order they were handed in.
+    /// The views in the order they were passed in.
     pub fn views(&self) -> &[View] {
         &self.views
     }
@@ -151,10 +151,11 @@ fn check_sources(name: &str, view: usize, sources: &[u32], views: usize) -> Resu
     Ok(())
 }
 
-/// Percentiles of the depths of sparse points that bound a view's range: outliers of the triangulation lie beyond.
+/// Percentiles of the depths of sparse points that bound a view's range: outliers of the triangulation lie
+/// beyond.
 const RANGE_PERCENTILES: (f64, f64) = (0.01, 0.99);
-/// Surfaces without features may lie before and behind all points. The search is uniform in inverse depth, where twice
-/// the largest depth is not far.
+/// Surfaces without features may lie in front of and behind all points. The search is uniform in inverse
+/// depth: doubling the largest depth adds little to it.
 const RANGE_WIDENING: (f64, f64) = (0.75, 2.0);
 
 fn range_of_points(views: &[View], view: usize, points: &[SparsePoint]) -> Result<DepthRange> {
@@ -169,7 +170,7 @@ fn range_of_points(views: &[View], view: usize, points: &[SparsePoint]) -> Resul
         return Err(Error::argument(
             format!("depth range of {}", views[view].name),
             "unknown",
-            "sparse points that this view saw, or a depth range given by hand (--depth-range MIN MAX)",
+            "sparse points that this view saw, or a depth range (--depth-range MIN MAX)",
         ));
     }
     depths.sort_by(f64::total_cmp);

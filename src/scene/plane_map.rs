@@ -20,14 +20,14 @@ pub struct PixelEstimate {
     pub validated: bool,
 }
 
-/// A cost in two bytes: between searches it only ranks the planes that views propagate to each other. The upper half of
-/// an f32's bits, a relative error of 2^-8 at most.
+/// A cost in two bytes: between searches it only ranks the planes that views propagate to each other. The
+/// upper 16 bits of an f32, a relative error of at most 2^-8.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct RankingCost(u16);
 
 impl From<f32> for RankingCost {
     fn from(cost: f32) -> RankingCost {
-        // To the nearest: what is added carries no number beyond infinity.
+        // Rounds to nearest; the carry does not go beyond infinity.
         RankingCost((cost.to_bits().saturating_add(0x8000) >> 16) as u16)
     }
 }
@@ -61,13 +61,13 @@ impl PlaneMap {
         self.planes.iter().filter(|plane| plane.validated).count() as u64
     }
 
-    /// The validated planes as other views look them up, with inverse depth 0 elsewhere.
+    /// The validated planes as other views read them, with inverse depth 0 elsewhere.
     pub fn publish(&self, camera: &Camera) -> Vec<CompactPlane> {
         slanted(camera, &self.planes).map(CompactPlane::from).collect()
     }
 
-    /// The map on the next finer scale: each fine pixel takes the plane, cost and verdict of its coarse pixel. A plane that
-    /// leaves the depth range at the fine pixel keeps the depth of the coarse one.
+    /// The map on the next finer scale: each fine pixel takes the plane, cost and verdict of its coarse
+    /// pixel. A plane that leaves the depth range at the fine pixel keeps the depth of the coarse one.
     pub fn upsample(&self, coarse: &Camera, fine: &Camera, range: DepthRange) -> PlaneMap {
         let (grid, coarse_grid) = (fine.grid(), coarse.grid());
         let refine = |index: usize| {
@@ -94,7 +94,8 @@ impl PlaneMap {
     }
 }
 
-/// The normal, turned as little as makes it face the ray: a grazing one may face the coarse pixel's ray alone.
+/// The normal, changed as little as necessary to face the ray: a grazing one may face the coarse pixel's ray
+/// only.
 fn turned_to(normal: DVec3, ray: DVec3) -> DVec3 {
     let away = normal.dot(ray) + f64::from(MIN_FACING);
     if away <= 0.0 { normal } else { (normal - ray * (away / ray.length_squared())).normalize() }
@@ -132,7 +133,7 @@ mod tests {
         for (cost, kept) in costs.into_iter().zip(kept) {
             assert!(kept == cost || (kept - cost).abs() <= cost / 256.0, "{kept} for {cost}");
         }
-        assert_eq!(size_of::<PixelEstimate>(), 20, "the cost takes no bytes of its own");
+        assert_eq!(size_of::<PixelEstimate>(), 20, "the cost fits into the padding");
     }
 
     #[test]
@@ -175,7 +176,7 @@ mod tests {
         let coarse = fine.halved();
         let map = testing::exact(&coarse);
         let depths = || map.planes.iter().map(|plane| f64::from(plane.depth));
-        // No more than the coarse depths themselves.
+        // Exactly the range of the coarse depths.
         let range = DepthRange { near: depths().fold(f64::MAX, f64::min), far: depths().fold(0.0, f64::max) };
         for plane in map.upsample(&coarse, &fine, range).planes {
             assert!((range.near as f32..=range.far as f32).contains(&plane.depth));

@@ -12,14 +12,14 @@ pub struct ScaledView {
     pub camera: Camera,
     /// Its gray image in the layout the kernels sample.
     pub image: PackedImage,
-    /// Where a depth is wanted: where any pixel of full size wants one.
+    /// `true` where a depth is estimated: where the mask is set in any of the pixels of full size.
     pub mask: Option<Vec<bool>>,
-    /// Where surfaces are looked for.
+    /// The depth range of the search.
     pub range: DepthRange,
 }
 
 impl ScaledView {
-    /// The view of a scene with this index, its image smaller by this power of two.
+    /// The view of a scene with this index, its image reduced by this power of two.
     pub fn of(scene: &Scene, index: usize, downscale: u32) -> ScaledView {
         ScaledView::new(&scene.views()[index], scene.depth_range(index), downscale)
     }
@@ -42,8 +42,8 @@ mod tests {
     use super::*;
     use glam::{DMat3, DVec3};
 
-    /// Two views of 5 x 3 pixels of which only one pixel is wanted.
-    fn scene(wanted: usize) -> Scene {
+    /// Two views of 5 x 3 pixels whose masks are set in one pixel only.
+    fn scene(set_pixel: usize) -> Scene {
         let camera = Camera {
             width: 5,
             height: 3,
@@ -58,7 +58,7 @@ mod tests {
             name: name.to_owned(),
             picture: Picture::from_gray(5, 3, (0..15).map(|pixel| pixel * 10).collect()).unwrap(),
             camera,
-            mask: Some((0..15).map(|pixel| pixel == wanted).collect()),
+            mask: Some((0..15).map(|pixel| pixel == set_pixel).collect()),
             depth_range: Some(DepthRange { near: 1.0, far: 2.0 }),
             sources: None,
         };
@@ -66,15 +66,15 @@ mod tests {
     }
 
     #[test]
-    fn a_coarse_pixel_is_wanted_where_any_of_its_fine_ones_is() {
-        for wanted in 0..15 {
-            let (x, y) = (wanted % 5, wanted / 5);
-            for halvings in 0..4usize {
-                let view = ScaledView::of(&scene(wanted), 0, 1 << halvings);
+    fn a_coarse_mask_is_set_where_it_is_in_any_of_the_fine_pixels() {
+        for set_pixel in 0..15 {
+            let (x, y) = (set_pixel % 5, set_pixel / 5);
+            for level in 0..4usize {
+                let view = ScaledView::of(&scene(set_pixel), 0, 1 << level);
                 let width = view.camera.width as usize;
                 let mask = view.mask.as_ref().unwrap();
                 assert_eq!(mask.len(), view.camera.pixels());
-                let expected = (y >> halvings) * width + (x >> halvings);
+                let expected = (y >> level) * width + (x >> level);
                 assert!((0..mask.len()).all(|pixel| mask[pixel] == (pixel == expected)));
             }
         }

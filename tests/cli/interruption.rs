@@ -1,4 +1,4 @@
-//! Ctrl-C and SIGTERM: the exit status, what is printed, and that files are whole.
+//! Ctrl-C and SIGTERM: the exit status, what is printed, and that files are complete.
 
 use super::layouts::map;
 use super::{HEIGHT, WIDTH, board, command, files, path, small_board};
@@ -35,14 +35,14 @@ fn ctrl_c_and_sigterm_during_the_search_leave_everything_as_it_was() {
 }
 
 #[test]
-fn ctrl_c_during_the_writing_leaves_whole_files() {
+fn ctrl_c_during_the_writing_leaves_complete_files() {
     let scene = small_board();
     let (status, printed) = interrupted(&["reconstruct", path(&scene)], "writing", "-INT");
     let dense = scene.path().join("dense");
-    // The writing of so little may be over before the signal arrives.
+    // The few files may be written before the signal arrives.
     let finished = status == Some(0);
     assert!(finished || status == Some(130) && printed.contains("whole"), "{status:?} {printed}");
-    assert_eq!(finished, dense.join("report.json").exists(), "a report stands beside finished runs only");
+    assert_eq!(finished, dense.join("report.json").exists(), "only finished runs have a report");
     let stereo = dense.join("stereo");
     // It may also arrive before the first file.
     let written = if stereo.exists() { files(&stereo) } else { Vec::new() };
@@ -53,6 +53,6 @@ fn ctrl_c_during_the_writing_leaves_whole_files() {
         };
         let is_graph = path.components().any(|part| part.as_os_str() == "consistency_graphs");
         let whole = is_graph || map(&path, WIDTH / 4, HEIGHT / 4, channels).is_some();
-        assert!(whole, "{} is not whole", path.display());
+        assert!(whole, "{} is not complete", path.display());
     }
 }

@@ -1,4 +1,4 @@
-//! The layouts of the files a run leaves, read byte by byte.
+//! The layouts of the files that a run writes, byte by byte.
 
 use crate::{HEIGHT, NAMES, WIDTH, text};
 use std::fs;
@@ -13,7 +13,7 @@ pub fn map(path: &Path, width: usize, height: usize, channels: usize) -> Option<
     whole.then(|| values.chunks_exact(4).map(|value| f32::from_le_bytes(value.try_into().unwrap())).collect())
 }
 
-/// Maps and graphs of one view; what is validated is taken over from the raw estimate unchanged.
+/// Maps and graphs of one view; validated values equal the raw ones.
 pub fn check_maps(dense: &Path, name: &str, validated: usize) {
     let file = |what: &str, kind: &str| dense.join(format!("stereo/{what}/{name}.{kind}.bin"));
     let read = |what: &str, kind: &str, channels| {

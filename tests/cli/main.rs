@@ -1,4 +1,4 @@
-//! The command line from outside: what it prints, what it writes, how it ends.
+//! The command line: its output, its files and its exit status.
 #![cfg(feature = "cli")]
 
 mod dump;
@@ -58,7 +58,7 @@ fn copied_board() -> TempDir {
     folder
 }
 
-/// The board at a quarter of its size, for runs that need not find much.
+/// The board at a quarter of its size, for runs whose accuracy does not matter.
 fn small_board() -> TempDir {
     let folder = copied_board();
     for name in NAMES {
@@ -103,7 +103,7 @@ fn files(folder: &Path) -> Vec<(PathBuf, u64)> {
 }
 
 #[test]
-fn info_tells_version_machine_and_every_option_of_the_presets() {
+fn info_prints_version_machine_and_every_option_of_the_presets() {
     let output = skep(&["info"]);
     assert!(output.status.success());
     let printed = text(&output.stdout);
@@ -129,7 +129,7 @@ fn the_environment_forces_a_simd_level_lowered_to_the_machine_s() {
         assert!(output.status.success());
         let printed = text(&output.stdout).to_owned();
         let level = printed.lines().find_map(|line| line.strip_prefix("SIMD level: "));
-        level.expect("info tells the level").to_owned()
+        level.expect("info prints the level").to_owned()
     };
     let best = SimdLevel::ALL.into_iter().rfind(|level| level.is_available()).unwrap();
     assert_eq!(level(None), best.name());
@@ -140,7 +140,7 @@ fn the_environment_forces_a_simd_level_lowered_to_the_machine_s() {
 }
 
 #[test]
-fn help_names_files_and_ways_out() {
+fn help_names_files_and_remedies() {
     let output = skep(&["help", "reconstruct"]);
     assert!(output.status.success());
     for word in ["fused.ply", "report.json", "preview/", "image_undistorter", "--depth-range", "Examples:"] {
@@ -149,7 +149,7 @@ fn help_names_files_and_ways_out() {
 }
 
 #[test]
-fn wrong_arguments_end_with_status_2_and_say_what_would_be_right() {
+fn wrong_arguments_end_with_status_2_and_name_the_valid_values() {
     let scene = board();
     let scene = scene.to_str().unwrap();
     let cases: [(&[&str], &str); 13] = [
@@ -189,11 +189,11 @@ fn a_missing_scene_ends_with_status_1_and_its_name() {
         assert_eq!(status, Some(1), "{printed}");
         assert!(printed.contains(scene.to_str().unwrap()), "{printed}");
     }
-    assert!(!scene.exists(), "nothing is made for a scene there is not");
+    assert!(!scene.exists(), "nothing is created for a missing scene");
 }
 
 #[test]
-fn without_points_the_error_names_both_ways_out_and_a_range_is_one() {
+fn without_points_the_error_names_both_remedies_and_a_range_works() {
     let scene = small_board();
     fs::write(scene.path().join("sparse/points3D.txt"), "").unwrap();
     let (status, printed) = failure(&["reconstruct", path(&scene)]);
@@ -210,7 +210,7 @@ fn without_points_the_error_names_both_ways_out_and_a_range_is_one() {
 }
 
 #[test]
-fn an_output_that_cannot_be_written_is_found_out_before_the_work() {
+fn an_output_that_cannot_be_written_is_detected_before_the_run() {
     let scene = small_board();
     let occupied = scene.path().join("occupied");
     fs::write(&occupied, "a file").unwrap();
@@ -258,8 +258,8 @@ fn parts_of_the_method_can_be_left_out_quietly() {
     assert_eq!(option("schedule.scales"), schedule);
 }
 
-/// README's first command, on a copy: every promised file with its layout, the report, then the cloud again
-/// from the maps alone.
+/// README's first command, on a copy: the layout of every documented file, the report, then the cloud from
+/// the maps alone.
 #[test]
 fn the_embedded_scene_end_to_end() {
     let repository = files(&board());
@@ -296,7 +296,7 @@ fn the_embedded_scene_end_to_end() {
     assert_eq!(files(&board()), repository, "nothing is written into the repository");
 }
 
-/// The fields that tools read, and that the views add up to the totals.
+/// Checks the fields that tools read, and that the totals are the sums over the views.
 fn check_report(report: &Value) {
     let totals = &report["totals"];
     assert_eq!(totals["pixels"], NAMES.len() * WIDTH * HEIGHT);
@@ -334,7 +334,7 @@ fn check_report(report: &Value) {
     assert!(report["threads"].as_u64() > Some(0) && report["warnings"].is_array());
 }
 
-/// The last lines say where to look.
+/// Checks that the last lines name the results.
 fn check_summary(printed: &str, dense: &Path, points: usize) {
     let cloud = format!("{points} points in {}", dense.join("fused.ply").display());
     assert!(printed.contains(&cloud), "{printed}");
@@ -344,7 +344,7 @@ fn check_summary(printed: &str, dense: &Path, points: usize) {
     }
 }
 
-/// Where there is no terminal, a line for each step that is new, and no more.
+/// Checks that without a terminal each new step prints one line.
 fn check_lines(printed: &str) {
     let steps: Vec<&str> = printed.lines().filter_map(|line| line.split(", 7 views:").next()).collect();
     assert!(steps.iter().any(|step| step.starts_with("search")), "{printed}");

@@ -1,4 +1,4 @@
-//! Comparison of maps with the truth.
+//! Comparison of maps with ground truth.
 
 use glam::DVec3;
 use skep::Maps;

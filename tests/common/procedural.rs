@@ -15,7 +15,7 @@ pub enum Texture {
     Uniform,
 }
 
-/// A finite surface of the world.
+/// The shape of a surface.
 #[derive(Debug, Clone, Copy)]
 pub enum Shape {
     /// A rectangle around `center`, spanned by the unit vectors `right` and `down`, visible from both sides.
@@ -44,7 +44,7 @@ pub struct Hit {
     pub surface: usize,
 }
 
-/// Rendered views of surfaces, with the truth.
+/// Rendered views of surfaces, with ground truth.
 pub struct Procedural {
     pub surfaces: Vec<Surface>,
     pub views: Vec<View>,
@@ -256,7 +256,7 @@ pub fn wall(texture: Texture) -> Surface {
     Surface { shape: Shape::upright(center, 12.0, DVec2::splat(20.0)), texture }
 }
 
-/// A sphere before a wall, both textured.
+/// A sphere in front of a wall, both textured.
 pub fn plane_and_sphere() -> Procedural {
     let shape = Shape::Sphere { center: DVec3::new(0.1, 0.0, -0.2), radius: 0.7 };
     Procedural::new(vec![Surface { shape, texture: Texture::Noise }, wall(Texture::Noise)], &cameras())
@@ -265,7 +265,8 @@ pub fn plane_and_sphere() -> Procedural {
 /// Index of the post among the surfaces of [`occluding_post`].
 pub const POST: usize = 0;
 
-/// A narrow upright post before a wall, both textured: each view hides another part of the wall.
+/// A narrow upright post in front of a wall, both textured: it occludes another part of the wall in each
+/// view.
 pub fn occluding_post() -> Procedural {
     let shape = Shape::upright(DVec3::new(0.0, 0.0, -0.4), 0.0, DVec2::new(0.25, 20.0));
     Procedural::new(vec![Surface { shape, texture: Texture::Noise }, wall(Texture::Noise)], &cameras())

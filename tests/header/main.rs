@@ -15,7 +15,7 @@ fn config() -> cbindgen::Config {
     cbindgen::Config::from_file(root().join("cbindgen.toml")).expect("cbindgen.toml is in order")
 }
 
-/// Compares a committed file with its generated text, after writing it where that is asked for.
+/// Compares a committed file with its generated text, after writing it if `SKEP_UPDATE_HEADER` is set.
 fn check(path: &str, generated: &str) {
     let path: PathBuf = root().join(path);
     if std::env::var_os("SKEP_UPDATE_HEADER").is_some() {
@@ -32,7 +32,7 @@ fn check(path: &str, generated: &str) {
 }
 
 #[test]
-fn the_committed_header_is_the_one_the_source_gives() {
+fn the_committed_header_is_up_to_date() {
     check("include/skep.h", &manual::header());
 }
 

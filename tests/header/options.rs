@@ -1,4 +1,4 @@
-//! The list of options as the interfaces show it, from the library's own table.
+//! The list of options of each interface, from the library's table.
 
 use skep::{Kind, OptionInfo, Options};
 use std::fmt::Write;
@@ -60,7 +60,7 @@ fn group(info: &OptionInfo) -> &'static str {
     info.name.split_once('.').map_or("", |(group, _)| group)
 }
 
-/// The list for people, every line behind a mark of comments.
+/// The list as a comment; `mark` starts each line.
 fn list(mark: &str) -> String {
     let mut out = String::new();
     for (name, explanation) in std::iter::once(("", "Of the whole run:")).chain(Options::groups()) {
@@ -83,9 +83,10 @@ fn list(mark: &str) -> String {
 }
 
 pub fn in_c() -> String {
-    let introduction = "Options have a name with a group, which may be left out where no other group has an option \
-                        of that name. Below each name: what it does; the accepted values with their unit; the value \
-                        of the default preset, and those of other presets where they differ.";
+    let introduction = "Options have a name with a group, which may be left out where no other group has an \
+                        option of that name. Below each name: what it does; the accepted values with their \
+                        unit; the value of the default preset, and those of other presets where they \
+                        differ.";
     format!("/*\n{}{} */\n\n", wrap(introduction, " * ", " * "), list(" *"))
 }
 

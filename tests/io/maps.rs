@@ -76,7 +76,7 @@ fn broken_maps_are_refused() {
     assert_refused(read_changed(&|bytes| bytes.truncate(3)), &["truncated", "header"]);
     assert_refused(read_changed(&|bytes| bytes.clear()), &["truncated", "header"]);
     assert_refused(read_changed(&|bytes| bytes[4] = b'3'), &["header is 3&2&3&", "1 channel"]);
-    assert_refused(read_changed(&|bytes| bytes[0] = b'0'), &["0&2&1&", "no side of 0"]);
+    assert_refused(read_changed(&|bytes| bytes[0] = b'0'), &["0&2&1&", "height of at least 1"]);
     assert_refused(read_changed(&|bytes| bytes[0] = b'-'), &["640&480&1&"]);
     for (value, name) in [(f32::NAN, "NaN"), (f32::INFINITY, "inf"), (-1.0, "-1")] {
         let change = move |bytes: &mut Vec<u8>| bytes[6 + 16..][..4].copy_from_slice(&value.to_le_bytes());

@@ -1,4 +1,4 @@
-//! Photographs in, previews out.
+//! Photographs and previews.
 
 use crate::assert_refused;
 use image::{ExtendedColorType, ImageBuffer, Luma, save_buffer};

@@ -61,7 +61,7 @@ fn broken_clouds_are_refused() {
         read_changed(&|bytes| bytes.truncate(bytes.len() - 1)),
         &["fused.ply", "fewer than 2 points"],
     );
-    assert_refused(read_changed(&|bytes| bytes.push(0)), &["goes on after its 2 points"]);
+    assert_refused(read_changed(&|bytes| bytes.push(0)), &["bytes follow the 2 points"]);
     assert_refused(read_changed(&|bytes| bytes.truncate(20)), &["fused.ply"]);
     assert_refused(read_changed(&|bytes| bytes[0] = b'q'), &["fused.ply"]);
     let replace = |from: &'static str, to: &'static str| {

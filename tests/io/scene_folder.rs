@@ -106,7 +106,7 @@ fn a_scene_that_is_written_is_read_back_the_same() {
 }
 
 #[test]
-fn a_view_s_name_that_is_no_file_of_the_folder_is_not_written() {
+fn a_view_whose_name_is_no_file_of_the_folder_is_not_written() {
     let folder = tempdir().unwrap();
     write_pictures(folder.path(), &model());
     model().write_text(&folder.path().join("sparse")).unwrap();

@@ -75,7 +75,7 @@ fn consistency_graphs_name_the_views_of_the_scene() {
     let raw = graph(MapKind::Raw);
     assert_eq!(raw.pixels, [[3, 0], [4, 0]]);
     assert_eq!((raw.views.get(0), raw.views.get(1)), ([5, 2].as_slice(), [2].as_slice()));
-    assert_eq!(graph(MapKind::Validated).pixels, [[3, 0]], "only what was validated");
+    assert_eq!(graph(MapKind::Validated).pixels, [[3, 0]], "validated pixels only");
 }
 
 #[test]
@@ -161,7 +161,7 @@ fn a_workspace_takes_the_scene_in_and_lists_its_images() {
     std::fs::create_dir_all(workspace.folder().join("sparse")).unwrap();
     let own = workspace.folder().join("sparse/points3D.txt");
     std::fs::write(&own, "# mine\n").unwrap();
-    // A second time nothing is in the way.
+    // A second call finds its own files.
     for _ in 0..2 {
         workspace.adopt(&outside).unwrap();
         let inside = SceneFolder::find(workspace.folder()).unwrap();
@@ -171,7 +171,7 @@ fn a_workspace_takes_the_scene_in_and_lists_its_images() {
             assert_eq!(read(&inside), read(&outside), "{name}");
         }
     }
-    assert_eq!(std::fs::read_to_string(own).unwrap(), "# mine\n", "what is there stays");
+    assert_eq!(std::fs::read_to_string(own).unwrap(), "# mine\n", "existing files are kept");
     // A model that is changed in the workspace is not changed in the scene.
     let before = std::fs::read(outside.sparse.join("cameras.txt")).unwrap();
     let cameras = workspace.folder().join("sparse/cameras.txt");

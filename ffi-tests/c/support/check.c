@@ -39,7 +39,7 @@ void require_ok(skep_status status, const char *what, const char *file, int line
     }
 }
 
-/* Fills the places for outputs again and tells whether they were as they had been filled. */
+/* Returns whether the places for outputs are unchanged, and fills them again. */
 static int outputs_were_untouched(void) {
     int untouched = 1;
     for (size_t i = 0; i < sizeof check_outputs; ++i) {
@@ -81,7 +81,7 @@ int same_bytes(const void *a, const void *b, size_t size) {
     return size == 0 || memcmp(a, b, size) == 0;
 }
 
-/* Threads of this process; 1 where nobody tells. */
+/* Threads of this process; 1 where the system does not report it. */
 static int threads(void) {
     char line[256];
     int count = 1;

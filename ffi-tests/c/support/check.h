@@ -1,4 +1,4 @@
-/* Checks that count and go on, and requirements without which nothing that follows makes sense. */
+/* Checks, which count failures and continue, and requirements, which end the program. */
 #ifndef CHECK_H
 #define CHECK_H
 

@@ -1,4 +1,4 @@
-/* Memory beside a page that nobody may touch: reading or writing past its end ends the program. */
+/* Memory before a protected page: reading or writing past its end ends the program. */
 #ifndef GUARDED_H
 #define GUARDED_H
 
@@ -22,7 +22,7 @@ void guarded_free(guarded *memory);
  */
 size_t rows_size(size_t row_bytes, size_t rows, size_t stride_bytes);
 
-/* Fills all bytes with a pattern, and tells whether those between the rows still have it. */
+/* Fills all bytes with a pattern, and returns whether those between the rows still have it. */
 void fill_rows(guarded *memory);
 int gaps_are_untouched(const guarded *memory, size_t row_bytes, size_t rows, size_t stride_bytes);
 

@@ -1,4 +1,4 @@
-/* Patches of the scene with the planes that are true of them, for the kernels. */
+/* Patches of the scene with their true planes, for the kernels. */
 #ifndef PATCHES_H
 #define PATCHES_H
 

@@ -1,4 +1,4 @@
-/* What a run found, copied out, and compared. */
+/* The results of a run, copied and compared. */
 #ifndef RESULTS_H
 #define RESULTS_H
 

@@ -22,7 +22,7 @@ static vec3 cross(vec3 a, vec3 b) {
 
 static vec3 unit(vec3 a) { return add((vec3){0, 0, 0}, a, 1 / sqrt(dot(a, a))); }
 
-/* A piece of a plane with two axes on it, as wide as `half` says. */
+/* A rectangle of a plane with two axes on it; `half` is half its size. */
 typedef struct panel {
     vec3 center, along_u, along_v, normal;
     double half_u, half_v;
@@ -64,7 +64,7 @@ static double noise(double x, double y, uint32_t seed) {
     return upper * (1 - v) + lower * v;
 }
 
-/* The ray's way to the surface, in lengths of `direction`; 0 where it misses. */
+/* The distance along the ray to the surface, in multiples of `direction`; 0 where it misses. */
 static double hit(const panel *at, vec3 from, vec3 direction, double *u, double *v) {
     const double along = dot(at->normal, direction);
     const double way = dot(at->normal, add(at->center, from, -1)) / along;
@@ -124,7 +124,7 @@ static void photograph_pixel(const scene *made, photograph *taken, const pose *f
             sum[channel] += color[channel] / (SIDE * SIDE);
         }
     }
-    /* Windows that see the board and the wall fit neither: they are left out of what is checked. */
+    /* Windows that cover the board and the wall match neither: they are not checked. */
     const int reach = 4;
     for (int corner = 0; corner < 9; ++corner) {
         const double dx = (corner % 3 - 1) * reach, dy = (corner / 3 - 1) * reach;
@@ -179,7 +179,7 @@ static vec3 columns_times(const skep_camera *camera, vec3 a) {
                   r[2] * a.x + r[5] * a.y + r[8] * a.z};
 }
 
-/* Whether a point of the world is visible in a view of the world: there is nothing before it. */
+/* Whether a point is visible in a view: inside the image and not occluded. */
 static int sees(const scene *made, uint32_t view, vec3 point) {
     const skep_camera *camera = &made->photographs[view].camera;
     const double *t = camera->translation;

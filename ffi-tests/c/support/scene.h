@@ -1,6 +1,6 @@
 /*
- * A slanted wall and a board before it, photographed from a few sides: every depth and normal is
- * known.
+ * A slanted wall and a board in front of it, in synthetic photographs with exact depths and
+ * normals.
  */
 #ifndef SCENE_H
 #define SCENE_H
@@ -9,7 +9,7 @@
 
 enum { MAX_VIEWS = 5 };
 
-/* One photograph with what is true of its pixels, all dense, row after row. */
+/* One photograph with the true values of its pixels, all dense, row by row. */
 typedef struct photograph {
     skep_camera camera;
     uint8_t *rgb;
@@ -32,13 +32,13 @@ typedef struct scene {
     size_t view_total;
 } scene;
 
-/* Between these depths lies all there is, in every view. */
+/* The depths of all surfaces in every view are between these. */
 extern const double SCENE_NEAR;
 extern const double SCENE_FAR;
 
 /*
  * The scene of all tests: 5 views of 72 x 54 pixels or, where SKEP_TEST_SMALL is set, 4 of 24 x 18,
- * which are too small to be found well, but fast.
+ * which are too small for accurate results, but fast.
  */
 void scene_make(scene *made);
 int scene_is_small(void);
@@ -53,7 +53,7 @@ skep_image scene_image(const scene *made, uint32_t view);
 /* All views with their sparse points. */
 skep_scene *scene_hand_in(const scene *made);
 
-/* Options that find the scene in little time, on two scales. */
+/* Options of a fast run on two scales. */
 skep_options *quick_options(void);
 
 /* A whole run, which must succeed. NULL options are the default ones. */

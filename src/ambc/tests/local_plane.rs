@@ -8,7 +8,8 @@ use glam::Vec3;
 
 const TOLERANCE: f32 = 0.01;
 
-/// The neighbors of a pixel with the wall's depth, multiplied by a `factor` of their position, and another normal.
+/// The neighbors of a pixel with the wall's depth, multiplied by a `factor` of their position, and another
+/// normal.
 fn depths(world: &World, pixel: (usize, usize), factor: impl Fn(usize, usize) -> f32) -> Colonies {
     let mut colonies = Colonies::new(Grid { width: 36, height: 28 }, 1);
     let others = |&(x, y): &(usize, usize)| color((x, y)) != color(pixel);

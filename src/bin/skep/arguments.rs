@@ -31,7 +31,7 @@ pub struct Reconstruct {
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Set of option values to start from: default has the best quality; fast takes less than half of its
-    /// time; paper follows the paper to the letter and is slow
+    /// time; paper follows the paper literally and is slow
     #[arg(long, default_value = "default", value_parser = Options::PRESETS)]
     pub preset: String,
     /// Worker threads; 0 uses one for each core. The result does not depend on it
@@ -72,11 +72,11 @@ fn setting(text: &str) -> std::result::Result<(String, String), String> {
 /// A part of the method that can be left out.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Part {
-    /// The view set of a pixel is not refined by incidence and visibility
+    /// Refinement of the view set of each pixel by incident angle and visibility
     ViewSelection,
-    /// Planes of validated neighbors get no reward
+    /// Reward of planes that come from validated neighbors
     Reward,
-    /// Consistent planes are not propagated to other views
+    /// Propagation of consistent planes to other views
     Propagation,
 }
 
@@ -147,10 +147,10 @@ impl Fuse {
 const EXAMPLES: &str = "\
 Examples:
   skep reconstruct SCENE            maps and cloud of a scene, into SCENE/dense
-  skep fuse SCENE/dense             the cloud again, from existing maps
+  skep fuse SCENE/dense             the cloud alone, from existing maps
   skep info                         the options and their values in the presets
-  skep info sigma_color             what one option does
-  skep help reconstruct             what the files are, and what to do when it fails
+  skep info sigma_color             explanation of one option
+  skep help reconstruct             input and output files, and remedies of failures
 
 Exit status: 0 done, 1 failed, 2 wrong arguments, 130 interrupted (Ctrl-C).";
 
@@ -164,14 +164,14 @@ The scene:
 Results, in COLMAP's layouts:
   fused.ply                        the cloud: position, normal, color
   fused.ply.vis                    the views each point was fused from
-  preview/NAME.depth.png           pictures to look at first: depth, normal and number of
-          NAME.normal.png          source views of each pixel; black where nothing was validated
+  preview/NAME.depth.png           previews: depth, normal and number of source views of
+          NAME.normal.png          each pixel; black where no plane was validated
           NAME.views.png
   stereo/depth_maps/NAME.photometric.bin    the raw estimate of every pixel
   stereo/depth_maps/NAME.geometric.bin      the validated pixels only
   stereo/normal_maps, stereo/consistency_graphs    likewise: normals, and the view set of each pixel
-  images, sparse                   the scene again: the folder is a COLMAP workspace, so that
-                                   `colmap stereo_fusion --workspace_path DIR ...` reads it as it is
+  images, sparse                   copy of the scene, for COLMAP: the folder is a workspace
+                                   of `colmap stereo_fusion --workspace_path DIR ...`
   report.json                      counts, times and options; written last
 
 Examples:
@@ -183,17 +183,17 @@ Examples:
                                          .validated.png (white: validated), and so on
 
 When it fails:
-  no sparse points: give --depth-range MIN MAX, or triangulate points:
+  no sparse points: set --depth-range MIN MAX, or triangulate points:
     colmap point_triangulator --database_path DATABASE --image_path IMAGES \\
       --input_path MODEL --output_path SCENE/sparse
   an empty or thin cloud: the last lines say why pixels were dropped, report.json for each view;
     preview/NAME.views.png shows where too few views see the surface.
-  surfaces missing at one distance: the depth range does not reach them; depth_min and depth_max in
-    report.json are what was searched, --depth-range MIN MAX sets them.";
+  surfaces missing beyond some distance: they are outside the depth range; report.json has the range
+    as depth_min and depth_max, --depth-range MIN MAX sets it.";
 
 const FUSE_HELP: &str = "\
 The workspace is what `skep reconstruct` or `colmap patch_match_stereo` writes: stereo/depth_maps and
-stereo/normal_maps. Its scene, images/ and sparse/, is searched in WORKSPACE and in the folder above it.
+stereo/normal_maps. Its scene, images/ and sparse/, is in WORKSPACE or in the folder above it.
 The geometric (validated) maps are fused if any view has one, else the photometric (raw) ones.
 FILE.ply.vis, the views of each point, is written beside FILE.ply.
 

@@ -1,8 +1,8 @@
-//! `skep reconstruct --dump DIR`: the run taken apart, with pictures of every cycle's maps for those who
-//! study the method.
+//! `skep reconstruct --dump DIR`: a stepwise run that writes the maps of every cycle as pictures, to study
+//! the method.
 //!
 //! The stages are those of [`skep::reconstruct`] in the same order, one view at a time, so the result has the
-//! same bits. It takes longer: views do not share the threads.
+//! same bits. It is slower: the views are processed one at a time.
 
 use skep::fusion::{FusionView, fuse, overlaps};
 use skep::io::{write_depth_preview, write_normal_preview, write_views_preview};
@@ -10,8 +10,7 @@ use skep::{Checked, Options, PointCloud, Progress, ProgressFn, Reconstruction, R
 use skep::{EstimateRef, Searched, Stepper, ViewEstimate, ViewResult, ignore_progress};
 use std::path::{Path, PathBuf};
 
-/// Fraction of the run that fusion counts for in the progress; measured on photographs, and no more than a
-/// guess is needed.
+/// Fraction of the progress that fusion takes; a rough measurement on photographs.
 const FUSION_SHARE: f64 = 0.03;
 
 /// Runs all cycles and fuses; writes the maps of each cycle into a folder of its own below `folder`. On the
@@ -52,7 +51,7 @@ struct Dump<'a> {
 }
 
 impl Dump<'_> {
-    /// Brings the estimates to the cycle's scale, propagates them between views and searches every view.
+    /// Upsamples the estimates to the cycle's scale, propagates them between views and searches every view.
     fn search(
         &self,
         cycle: usize,
@@ -74,13 +73,13 @@ impl Dump<'_> {
         (0..self.stepper.views()).map(search).collect()
     }
 
-    /// Checks every view against what all have just found.
+    /// Checks every view against the searched estimates of all.
     fn check(&self, searched: &[ViewEstimate<Searched>]) -> Result<Vec<ViewEstimate<Checked>>> {
         let found: Vec<_> = searched.iter().map(|found| Some(EstimateRef::Searched(found))).collect();
         searched.iter().map(|own| self.stepper.check(own, &found)).collect()
     }
 
-    /// Fraction of the whole run that is done when this much of a view's search is.
+    /// Fraction of the whole run that is done at a fraction of a view's search.
     fn done(&self, cycle: usize, view: usize, share: f64) -> f64 {
         // A pass over a pixel costs as much as it has food sources; an iteration has two colors.
         let work = |cycle: &skep::Cycle| {
@@ -93,8 +92,7 @@ impl Dump<'_> {
         (1.0 - FUSION_SHARE) * (before + now) / works.iter().sum::<f64>()
     }
 
-    /// `DIR/03-size2-cycle4`: the place in the run, so that folders sort, the downscale, and the cycle on
-    /// that scale.
+    /// `DIR/03-size2-cycle4`: index in the run (folders sort by it), downscale, and cycle on that scale.
     fn cycle_folder(&self, cycle: usize) -> PathBuf {
         let at = self.stepper.cycles()[cycle];
         self.folder.join(format!("{cycle:02}-size{}-cycle{}", at.scale.downscale, at.cycle + 1))

@@ -11,7 +11,7 @@ use skep::{Error, Options, PointCloud, Progress};
 /// Runs the command.
 pub fn run(arguments: &Fuse) -> Result<(), Failure> {
     let display = Display::new(arguments.quiet);
-    display.say(&format!("reading {}", arguments.workspace.display()));
+    display.print(&format!("reading {}", arguments.workspace.display()));
     let workspace = Workspace::new(&arguments.workspace);
     let scene = match &arguments.scene {
         Some(folder) => SceneFolder::find(folder)?,
@@ -57,9 +57,9 @@ fn fuse_maps(maps: &WorkspaceMaps, display: Display, interrupt: &Interrupt) -> s
             overlap,
         })
         .collect();
-    let follower = display.follow();
+    let reporter = display.start();
     let progress = |progress: &Progress| {
-        follower.show(progress);
+        reporter.show(progress);
         interrupt.control_flow()
     };
     let cloud = fuse(&views, &Options::default().fusion, &progress)?;

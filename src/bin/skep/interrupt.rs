@@ -1,4 +1,4 @@
-//! Ctrl-C, SIGTERM and SIGHUP: a flag that long work reads.
+//! Ctrl-C, SIGTERM and SIGHUP: a flag that long calls poll.
 
 use crate::streams;
 use skep::{Error, Result};
@@ -6,17 +6,17 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Whether the user asked to stop.
+/// Whether the user requested to stop.
 pub struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
-    /// From here on Ctrl-C, SIGTERM and SIGHUP raise the flag. Before, they end the process at once, which is
-    /// right as long as nothing was written.
+    /// Installs the handler of Ctrl-C, SIGTERM and SIGHUP, which sets the flag. Before, they end the process
+    /// at once, which is harmless while nothing has been written.
     pub fn watch() -> Interrupt {
         let raised = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&raised);
-        // Without a handler the signals end the process between any two instructions; files are whole even
-        // then, because they are renamed into place.
+        // Without a handler the signals end the process at once; files are complete even then, because writes
+        // are atomic.
         if let Err(error) = ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)) {
             streams::warning(&format!("Ctrl-C will end the run at once, without a message: {error}"));
         }
@@ -28,7 +28,7 @@ impl Interrupt {
         if self.0.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
-    /// [`Error::Cancelled`] once the flag is raised.
+    /// [`Error::Cancelled`] if the flag is set.
     pub fn check(&self) -> Result<()> {
         match self.control_flow() {
             ControlFlow::Continue(()) => Ok(()),

@@ -7,9 +7,9 @@ use std::io::IsTerminal;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// Steps of the bar; finer ones could not be seen.
+/// Steps of the bar; finer ones are not visible.
 const BAR_STEPS: f64 = 1000.0;
-/// Fraction of the run below which the remaining time would be a guess.
+/// Fraction of the run below which the estimate of the remaining time is too uncertain to print.
 const FIRST_ESTIMATE: f64 = 0.01;
 
 /// How progress is shown.
@@ -20,8 +20,8 @@ pub enum Display {
     Bar,
 }
 
-/// Shows the progress of one piece of work; dropping it removes the bar, lines stay.
-pub struct Follower {
+/// Displays the progress of one call; dropping it removes the bar and keeps printed lines.
+pub struct Reporter {
     display: Display,
     bar: ProgressBar,
     started: Instant,
@@ -46,26 +46,26 @@ impl Display {
         }
     }
 
-    /// Prints a line about work without progress of its own.
-    pub fn say(self, line: &str) {
+    /// Prints a line about work that has no progress.
+    pub fn print(self, line: &str) {
         match self {
             Display::Silent => (),
             Display::Lines | Display::Bar => streams::notice(line),
         }
     }
 
-    /// Starts a piece of work; the remaining time is estimated from here.
-    pub fn follow(self) -> Follower {
+    /// Starts the clock of a call, from which the remaining time is estimated.
+    pub fn start(self) -> Reporter {
         let bar = match self {
             Display::Silent | Display::Lines => ProgressBar::hidden(),
             Display::Bar => bar(),
         };
-        Follower { display: self, bar, started: Instant::now(), last: Mutex::new(None) }
+        Reporter { display: self, bar, started: Instant::now(), last: Mutex::new(None) }
     }
 }
 
-impl Follower {
-    /// Shows the progress. May be called from any thread; skipped while another thread is drawing, so that
+impl Reporter {
+    /// Displays the progress, from any thread; returns at once while another thread is drawing, so that
     /// workers never wait.
     pub fn show(&self, progress: &Progress) {
         let Ok(mut last) = self.last.try_lock() else { return };
@@ -74,7 +74,7 @@ impl Follower {
             view: progress.view,
             bar_steps: (progress.done * BAR_STEPS) as u64,
         };
-        // A later call may have drawn already: the bar never moves back.
+        // Another thread may have drawn later progress already: the bar never moves back.
         if last.is_some_and(|last| last == shown || shown.bar_steps < last.bar_steps) {
             return;
         }
@@ -91,7 +91,7 @@ impl Follower {
     }
 }
 
-impl Drop for Follower {
+impl Drop for Reporter {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
     }
@@ -146,14 +146,14 @@ mod tests {
         Progress { phase: Phase::Search, downscale: 2, cycle: 0, view: 2, views: 7, done: 0.25 };
 
     #[test]
-    fn the_time_left_comes_from_the_share_done_and_the_time_it_took() {
+    fn the_time_left_follows_from_the_fraction_done_and_the_time_elapsed() {
         assert_eq!(left(0.25, Duration::from_secs(10)), ", 0:30 left");
         assert_eq!(left(0.5, Duration::from_secs(3725)), ", 1:02:05 left");
         assert_eq!(left(1.0, Duration::from_secs(10)), ", 0:00 left");
     }
 
     #[test]
-    fn no_time_is_told_before_anything_is_done() {
+    fn no_time_left_is_printed_without_progress() {
         assert_eq!(left(0.0, Duration::from_secs(10)), "");
     }
 

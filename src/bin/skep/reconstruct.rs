@@ -1,4 +1,4 @@
-//! `skep reconstruct`: a scene folder in, maps, previews, cloud and report out.
+//! `skep reconstruct`: maps, previews, cloud and report of a scene folder.
 
 use crate::arguments::Reconstruct;
 use crate::dump;
@@ -23,7 +23,7 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
 
     let stopwatch = Mutex::new(Stopwatch::start());
     let display = Display::new(arguments.quiet);
-    display.say(&format!("reading {}", arguments.scene.display()));
+    display.print(&format!("reading {}", arguments.scene.display()));
     let scene = read_scene(&arguments.scene, depth_range)?;
     require_writable(&output)?;
     if let Some(folder) = &arguments.dump {
@@ -38,16 +38,16 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
         None => skep::reconstruct(&scene, &options, progress),
     };
     let kept = match &arguments.dump {
-        Some(_) => "the pictures of the finished cycles are whole, nothing else was written",
+        Some(_) => "the pictures of the finished cycles are complete, nothing else was written",
         None => "nothing was written",
     };
-    let result = followed(&estimate, display, &stopwatch, &interrupt)
+    let result = with_progress(&estimate, display, &stopwatch, &interrupt)
         .inspect_err(|error| explain_interruption(error, kept))?;
     result.warnings.iter().for_each(|warning| streams::warning(warning));
 
     let mut stopwatch = stopwatch.into_inner().unwrap_or_else(PoisonError::into_inner);
     stopwatch.enter(Stage::Writing);
-    display.say(&format!("writing {}", output.display()));
+    display.print(&format!("writing {}", output.display()));
     let mut report = Report::new(&scene, &arguments.preset, &options, &result);
     let writers = pool(options.threads)?;
     writers.install(|| write(&output, &arguments.scene, &scene, &result, &interrupt))?;
@@ -60,23 +60,23 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
     Ok(())
 }
 
-/// Estimates and fuses, timed and with its progress shown, until it is done or interrupted.
-fn followed(
+/// Estimates and fuses; measures the times, displays the progress, and ends early when interrupted.
+fn with_progress(
     estimate: &dyn Fn(ProgressFn) -> Result<Reconstruction>,
     display: Display,
     stopwatch: &Mutex<Stopwatch>,
     interrupt: &Interrupt,
 ) -> Result<Reconstruction> {
-    let follower = display.follow();
+    let reporter = display.start();
     let progress = |progress: &Progress| {
         stopwatch.lock().unwrap_or_else(PoisonError::into_inner).enter(progress.phase.into());
-        follower.show(progress);
+        reporter.show(progress);
         interrupt.control_flow()
     };
     estimate(&progress)
 }
 
-/// Fails before hours of work when the results could not be written.
+/// Checks that results can be written before the run, which may take hours.
 fn require_writable(folder: &Path) -> Result<()> {
     let attempt = std::fs::create_dir_all(folder).and_then(|()| tempfile::tempfile_in(folder));
     attempt.map(drop).map_err(|error| Error::file(folder, format!("cannot be written to: {error}")))
@@ -91,7 +91,7 @@ fn write(
     result: &Reconstruction,
     interrupt: &Interrupt,
 ) -> Result<()> {
-    // A report means that everything beside it is complete and belongs together: an older one has to go
+    // A report implies that the files beside it are complete and of the same run: an older one is removed
     // first.
     let report = report_path(output);
     match std::fs::remove_file(&report) {
@@ -111,19 +111,19 @@ fn write(
     });
     all.inspect_err(|error| {
         let written = written.load(Ordering::Relaxed);
-        let kept = format!("{written} of {} views are written and whole", scene.views().len());
+        let kept = format!("the files of {written} of {} views are complete", scene.views().len());
         explain_interruption(error, &kept);
     })?;
-    let kept = "the maps of all views are written and whole; `skep fuse` makes the cloud from them";
+    let kept = "the maps of all views are complete; `skep fuse` makes the cloud from them";
     interrupt.check().inspect_err(|error| explain_interruption(error, kept))?;
     workspace.write_lists(scene.views().iter().map(|view| view.name.as_str()))?;
     workspace.adopt(&SceneFolder::find(folder)?)?;
     Workspace::write_cloud(&workspace.cloud(), &result.points)
 }
 
-/// Threads for work outside the library; 0 makes one for each core. For writing they are started after the
-/// library's threads ended and reuse the memory that those freed. Where no thread can be started the current
-/// one does the work: hours of estimation are not lost.
+/// A thread pool for work outside the library; 0 starts one thread for each core. The pool for writing is
+/// started after that of the library has ended, and reuses its memory. If no thread can be started, the
+/// current one does the work, so that the estimates are not lost.
 fn pool(threads: usize) -> Result<rayon::ThreadPool> {
     let expected = "a number of threads that the system can start";
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
@@ -135,14 +135,14 @@ fn report_path(output: &Path) -> PathBuf {
     output.join("report.json")
 }
 
-/// Says what an interruption leaves behind. Other errors carry their own text.
+/// Prints which files an interruption leaves. Other errors have a text of their own.
 fn explain_interruption(error: &Error, kept: &str) {
     if *error == Error::Cancelled {
         streams::notice(&format!("interrupted: {kept}"));
     }
 }
 
-/// The last lines: what was written and where to look first, or why the cloud is empty.
+/// The last lines: the written files and, if the cloud is empty, the reasons.
 fn summary(output: &Path, scene: &Scene, totals: &Totals) -> Vec<String> {
     let workspace = Workspace::new(output);
     let validated = share(totals, PixelStatus::Validated);
@@ -154,14 +154,14 @@ fn summary(output: &Path, scene: &Scene, totals: &Totals) -> Vec<String> {
         lines.extend(reasons(totals));
     }
     let first = &scene.views()[0].name;
-    lines.push(format!("look at {} and its neighbors first", workspace.preview(first, "depth").display()));
+    lines.push(format!("previews such as {}", workspace.preview(first, "depth").display()));
     lines.push(format!("maps in {}", output.join("stereo").display()));
     lines.push(format!("counts and times in {}", report_path(output).display()));
     lines.push(format!("done in {:.1} s", totals.wall_seconds));
     lines
 }
 
-/// Why the cloud is empty: how many pixels were dropped for which reason, and what would help.
+/// Why the cloud is empty: the number of pixels of each status, and the remedy.
 fn reasons(totals: &Totals) -> Vec<String> {
     let help = |status| match status {
         PixelStatus::Validated => {

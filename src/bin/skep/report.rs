@@ -1,4 +1,5 @@
-//! `report.json`: counts, times and options of a run. Tools read it: names stay, new ones may come.
+//! `report.json`: counts, times and options of a run. Tools read it: keys are stable, and new ones may be
+//! added.
 
 use crate::info;
 use crate::stopwatch::Times;
@@ -31,7 +32,7 @@ pub struct Report {
 pub struct Totals {
     pub pixels: u64,
     pub status_counts: BTreeMap<&'static str, u64>,
-    /// The same as `status_counts`, under the name that tools know.
+    /// The same as `status_counts`, under its earlier key, for compatibility.
     pub outcomes: BTreeMap<&'static str, u64>,
     pub ncc_evaluations: u64,
     pub bilinear_samples: u64,
@@ -53,7 +54,7 @@ struct ViewReport {
     depth_max: f64,
     sources: Vec<String>,
     status_counts: BTreeMap<&'static str, u64>,
-    /// The same as `status_counts`, under the name that tools know.
+    /// The same as `status_counts`, under its earlier key, for compatibility.
     outcomes: BTreeMap<&'static str, u64>,
     ncc_evaluations: u64,
     bilinear_samples: u64,
@@ -191,7 +192,7 @@ impl From<&CycleRecord> for CycleReport {
     }
 }
 
-/// Peak resident memory of the process, where the system tells (Linux).
+/// Peak resident memory of the process, where the system reports it (Linux).
 fn peak_resident_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -108,7 +108,7 @@ impl Stopwatch {
     }
 }
 
-/// CPU time of the whole process since it began; 0 where the system does not tell.
+/// CPU time of the whole process since it began; 0 where the system does not report it.
 fn cpu_now() -> Duration {
     ProcessTime::try_now().map_or(Duration::ZERO, |time| time.as_duration())
 }

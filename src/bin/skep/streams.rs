@@ -1,5 +1,4 @@
-//! Standard output and error. A reader that closed the pipe is no reason to stop a run: failed writes are
-//! ignored.
+//! Standard output and error. Failed writes are ignored: a closed pipe must not stop a run.
 
 use std::io::Write;
 

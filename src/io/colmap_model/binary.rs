@@ -22,11 +22,12 @@ pub(super) fn read(files: &Files) -> Result<Records> {
     })
 }
 
-/// A count and as many records.
+/// Reads a count and that many records.
 fn read_records<T>(path: &Path, record: fn(&mut FileReader, &Path) -> Result<T>) -> Result<Vec<T>> {
     let mut file = FileReader::open(path)?;
     let count = file.u64("the number of entries")?;
-    // No record is shorter than a byte, which is enough to know a nonsensical count.
+    // Every record has at least one byte: a count beyond the file's size is detected before any record is
+    // read.
     file.require(count, 1, "entries")?;
     let mut records = Vec::new();
     for _ in 0..count {
@@ -65,7 +66,7 @@ fn image(file: &mut FileReader, _: &Path) -> Result<ImageRecord> {
     Ok(record)
 }
 
-/// Bytes up to a zero.
+/// Reads a NUL-terminated name.
 fn name(file: &mut FileReader) -> Result<String> {
     let mut bytes = Vec::new();
     loop {

@@ -31,10 +31,10 @@ pub struct ModelImage {
 /// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ColmapModel {
-    /// The images in the order of the file, which is what consistency graphs and `fused.ply.vis` count along.
+    /// The images in the order of the file; consistency graphs and `fused.ply.vis` index this list.
     pub images: Vec<ModelImage>,
-    /// The points, with the indices of the images that saw them in ascending order. Their colors and errors
-    /// and the images' features are not kept.
+    /// The points, with the indices of the images that saw them in ascending order. Colors, errors and
+    /// features are not kept.
     pub points: Vec<SparsePoint>,
 }
 
@@ -44,13 +44,13 @@ impl ColmapModel {
         Files::find(folder).is_some()
     }
 
-    /// Reads `cameras`, `images` and, when it is there, `points3D` from a folder: the `.bin` files, else the
-    /// `.txt` files, as COLMAP chooses. Without a file of points there are none.
+    /// Reads `cameras`, `images` and, if it exists, `points3D` from a folder: the `.bin` files, else the
+    /// `.txt` files, in COLMAP's order of precedence. Without a file of points the model has none.
     ///
     /// # Errors
-    /// No model there; a camera model with distortion; ids or names that occur twice; ids that do not exist;
-    /// names that lead out of their folder; sizes of 0 and numbers that are not finite; a zero quaternion;
-    /// files that end early or go on; a model without images.
+    /// No model in the folder; a camera model with distortion; ids or names that occur twice; ids that do not
+    /// exist; names that lead outside the folder of images; sizes of 0 and numbers that are not finite; a
+    /// zero quaternion; truncated files and files with trailing bytes; a model without images.
     pub fn read(folder: &Path) -> Result<ColmapModel> {
         let Some(files) = Files::find(folder) else {
             let wanted =

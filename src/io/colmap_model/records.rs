@@ -48,7 +48,7 @@ impl Files {
         Files { binary, cameras: path("cameras"), images: path("images"), points: path("points3D") }
     }
 
-    /// The model of a folder; binary files come first, as in COLMAP.
+    /// The model of a folder; binary files take precedence, as in COLMAP.
     pub fn find(folder: &Path) -> Option<Files> {
         [true, false]
             .into_iter()
@@ -57,7 +57,7 @@ impl Files {
     }
 }
 
-/// Where a record is, for error texts.
+/// File and line of a record, for error texts.
 pub(super) struct Place<'a> {
     pub path: &'a Path,
     /// Counted from 1; `None` in binary files.
@@ -80,7 +80,7 @@ pub(super) struct CameraRecord {
     pub parameters: [f64; 4],
 }
 
-/// The camera models that are understood.
+/// The supported camera models.
 #[derive(Clone, Copy)]
 pub(super) enum Pinhole {
     /// f, cx, cy
@@ -95,8 +95,8 @@ impl Pinhole {
             "SIMPLE_PINHOLE" => Ok(Pinhole::Simple),
             "PINHOLE" => Ok(Pinhole::Full),
             _ => Err(place.error(format!(
-                "camera {camera} has the model {name}; expected PINHOLE or SIMPLE_PINHOLE, which photographs have \
-                 after `{UNDISTORT}`"
+                "camera {camera} has the model {name}; expected PINHOLE or SIMPLE_PINHOLE; undistort the \
+                 photographs first: `{UNDISTORT}`"
             ))),
         }
     }
@@ -155,7 +155,9 @@ impl Records {
             let place = Place { path: &files.images, line: record.line };
             let Some(camera) = cameras.get(&record.camera) else {
                 let (id, camera) = (record.id, record.camera);
-                return Err(place.error(format!("image {id} has the camera {camera}, which the model lacks")));
+                return Err(
+                    place.error(format!("image {id} has the camera {camera}, which is not in the model"))
+                );
             };
             if indices.insert(record.id, images.len() as u32).is_some() {
                 return Err(place.error(format!("image {} occurs twice", record.id)));
@@ -174,7 +176,7 @@ impl Records {
                 let index = indices.get(&id).copied();
                 views.push(index.ok_or_else(|| {
                     place.error(format!(
-                        "point {} was seen by the image {id}, which the model lacks",
+                        "the track of point {} has the image {id}, which is not in the model",
                         record.id
                     ))
                 })?);
@@ -243,7 +245,7 @@ pub(super) struct Layout {
     pub images: Vec<ImageRecord>,
     /// Position and point id of each image's features.
     pub features: Vec<Vec<([f64; 2], u64)>>,
-    /// Image id and place in its features for each point.
+    /// Image id and feature index of each entry of a point's track.
     pub tracks: Vec<Vec<[u32; 2]>>,
 }
 

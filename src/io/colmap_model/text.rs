@@ -65,7 +65,7 @@ fn image(mut fields: Fields) -> Result<ImageRecord> {
     })
 }
 
-/// Features are not kept, but a line that holds something else tells that the file is out of step.
+/// Features are not kept, but checked: a line with other contents means that lines are missing.
 fn check_features(mut fields: Fields) -> Result<()> {
     while !fields.is_empty() {
         for what in ["a feature's x", "a feature's y", "a feature's point id"] {
@@ -98,7 +98,7 @@ fn read_text(path: &Path) -> Result<String> {
     std::fs::read_to_string(path).map_err(|error| cannot_be_read(path, error))
 }
 
-/// Whether a line holds more than a comment.
+/// Whether a line is neither empty nor a comment.
 fn is_data(line: &str) -> bool {
     let line = line.trim();
     !line.is_empty() && !line.starts_with('#')
@@ -109,7 +109,7 @@ fn data_lines<'a>(path: &'a Path, text: &'a str) -> impl Iterator<Item = Fields<
     lines.map(|(index, line)| Fields::new(path, index, line))
 }
 
-/// The fields of a line, taken one by one.
+/// The fields of a line that are not read yet.
 struct Fields<'a> {
     place: Place<'a>,
     rest: &'a str,
@@ -158,7 +158,7 @@ impl<'a> Fields<'a> {
         if self.is_empty() {
             return Ok(());
         }
-        Err(self.place.error(format!("{:?} follows where the line should end", self.rest.trim())))
+        Err(self.place.error(format!("{:?} follows the last field", self.rest.trim())))
     }
 }
 

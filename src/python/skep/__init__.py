@@ -1,6 +1,6 @@
 """Dense multi-view stereo on the CPU.
 
-Calibrated photographs go in; depth, normal and source-view maps and a fused point cloud come out:
+From calibrated photographs to depth, normal and source-view maps and a fused point cloud:
 
     scene = skep.Scene()
     for photograph, (K, R, t) in zip(photographs, cameras):
@@ -11,8 +11,8 @@ Calibrated photographs go in; depth, normal and source-view maps and a fused poi
 There are three levels, which can be mixed: whole runs (`reconstruct`), the stages of a run on single views
 (`Stepper`), and kernels (`plane_homographies`, `patch_ncc`).
 
-What holds everywhere: x_cam = R x_world + t with x right, y down, z forward; depth is z; the center of the
-top-left pixel is (0, 0). Arrays that go in are copied, or only read during the call. The same input, options
+Conventions: x_cam = R x_world + t with x right, y down, z forward; depth is z; the center of the
+top-left pixel is (0, 0). Input arrays are copied, or read only during the call. The same input, options
 and version give the same bits. Calls release the interpreter's lock, and any function may be called from any
 thread.
 """
@@ -41,7 +41,7 @@ __version__: str = _ffi.string(_lib.skep_version()).decode()
 
 
 def simd_level_name() -> str:
-    """The instruction set that runs use unless option "simd" says otherwise: "scalar", "baseline" or "v3"
+    """The default instruction set of runs (option "simd"): "scalar", "baseline" or "v3"
     (AVX2).
     """
     name: str = _ffi.string(_lib.skep_simd_level_name()).decode()

@@ -1,4 +1,4 @@
-"""Between numpy arrays and C pointers. Nothing is copied that the library can read or write where it is."""
+"""Conversion of numpy arrays to C pointers, without a copy where the library can use the memory in place."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _C_TYPES = {"u1": "uint8_t", "u2": "uint16_t", "u4": "uint32_t", "f4": "float", 
 
 
 class Rows(NamedTuple):
-    """A map as the library takes it. `array` owns the memory: keep it as long as the pointer is used."""
+    """A map for the library. `array` owns the memory: keep it as long as the pointer is used."""
 
     pointer: Any
     stride: int
@@ -29,7 +29,7 @@ def pointer(array: NDArray[Any]) -> Any:
 
 
 def rows(values: ArrayLike, dtype: Any, shape: tuple[int, ...], name: str) -> Rows:
-    """A map of this type and shape: where it is if its rows are without gaps, else copied."""
+    """A map of this type and shape: in place if its rows have no gaps within, else copied."""
     array = np.asarray(values)
     if array.shape != shape:
         raise ArgumentError(f"{name} has shape {array.shape}: must be {shape}")
@@ -49,7 +49,7 @@ def doubles(values: ArrayLike, shape: tuple[int, ...], name: str) -> NDArray[np.
     try:
         array = np.ascontiguousarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise ArgumentError(f"{name} is no array of numbers: {error}") from None
+        raise ArgumentError(f"{name} is not an array of numbers: {error}") from None
     fits = array.ndim == len(shape) and all(want in (-1, have) for want, have in zip(shape, array.shape))
     if not fits:
         raise ArgumentError(f"{name} has shape {array.shape}: must be {str(shape).replace('-1', 'n')}")
@@ -67,14 +67,14 @@ def indices(values: Iterable[int] | NDArray[Any], name: str) -> NDArray[np.uint3
 
 
 def index(value: int, name: str) -> int:
-    """A number as C takes it; the library itself knows which there are."""
+    """A number for C; the library checks whether it is in range."""
     if not 0 <= value <= 0xFFFFFFFF:
         raise ArgumentError(f"{name} is {value}: must be a whole number from 0")
     return value
 
 
 def text(value: str | bytes, name: str) -> bytes:
-    """A text that ends where C thinks it does."""
+    """A text without NUL, which C would take as its end."""
     encoded = value.encode() if isinstance(value, str) else value
     if b"\0" in encoded:
         raise ArgumentError(f"{name} is {value!r}: must not contain NUL")

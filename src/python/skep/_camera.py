@@ -40,7 +40,7 @@ class Camera:
 
     @property
     def center(self) -> NDArray[np.float64]:
-        """Where the camera stands in the world."""
+        """The center of projection in the world frame."""
         center: NDArray[np.float64] = -self.R.T @ self.t
         return center
 
@@ -57,6 +57,6 @@ class Camera:
 
     @staticmethod
     def from_c(camera: Any) -> Camera:
-        """A copy of what the library tells."""
+        """A copy of a camera of the library."""
         K = [[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]]
         return Camera(K, np.reshape(list(camera.rotation), (3, 3)), list(camera.translation))

@@ -84,22 +84,22 @@ class Cloud:
 
 @dataclass(frozen=True, eq=False)
 class FusionView:
-    """A view with maps to be fused, of skep's or anyone's."""
+    """A view with maps to be fused, from skep or another source."""
 
     camera: Camera
     depth: NDArray[Any]
-    """float32, (height, width); what is not a finite number above 0 is no estimate."""
+    """float32, (height, width); values other than finite numbers above 0 are no estimate."""
     normal: NDArray[Any]
     """float32, (height, width, 3), in the camera frame."""
     image: NDArray[Any] | None = None
     """For the colors, of the maps' size; None gives gray points."""
     overlap: Iterable[int] | None = None
-    """The views that may see the same surface, as `Scene.overlap` tells; None is all the others."""
+    """The views that may see the same surface, as `Scene.overlap` returns them; None takes all others."""
     order: Order = "rgb"
     """Of the image's channels."""
 
     def fill(self, struct: Any, number: int, view_count: int) -> list[Any]:
-        """Writes the view into C's struct, and tells what must live as long as that is used."""
+        """Writes the view into C's struct; returns the objects that must live as long as it is used."""
         name = f"views[{number}]"
         shape = np.shape(self.depth)
         if len(shape) != 2 or 0 in shape:

@@ -26,19 +26,19 @@ class PoisonedError(Error, RuntimeError):
 
 
 class Cancelled(Error):
-    """The progress callback asked to stop."""
+    """The progress callback cancelled the call."""
 
     status = lib.SKEP_ERR_CANCELLED
 
 
 class FileError(Error, OSError):
-    """A file cannot be read, understood or written."""
+    """A file cannot be read, parsed or written."""
 
     status = lib.SKEP_ERR_FILE
 
 
 class CapacityError(Error):
-    """A buffer is smaller than what goes into it."""
+    """A buffer is too small for its contents."""
 
     status = lib.SKEP_ERR_CAPACITY
 

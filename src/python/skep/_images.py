@@ -11,7 +11,7 @@ from ._errors import ArgumentError
 from ._native import ffi, lib
 
 Order = Literal["rgb", "bgr"]
-"""The order of an image's channels: as matplotlib, Pillow and imageio have it, or as OpenCV does."""
+"""The order of an image's channels: that of matplotlib, Pillow and imageio, or that of OpenCV."""
 
 _LAYOUTS = {
     (1, "rgb"): lib.SKEP_FORMAT_GRAY,
@@ -25,7 +25,7 @@ _DEPTHS = {"u1": 0, "u2": lib.SKEP_FORMAT_16, "f4": lib.SKEP_FORMAT_FLOAT}
 
 
 class Image(NamedTuple):
-    """An image as the library takes it. `array` owns the pixels: keep it as long as the struct is used."""
+    """An image for the library. `array` owns the pixels: keep it as long as the struct is used."""
 
     struct: Any
     array: NDArray[Any]

@@ -26,7 +26,7 @@ _NAMES = tuple(_names())
 
 
 def _by_any_name() -> dict[str, str]:
-    """The full name of an option by each name that stands for it."""
+    """The full name of an option by each of its names."""
     fields = [name.rpartition(".")[2] for name in _NAMES]
     full = {field: name for field, name in zip(fields, _NAMES) if fields.count(field) == 1}
     full |= {name.replace(".", "_"): name for name in _NAMES}
@@ -213,7 +213,7 @@ class Options(Mapping[str, Value]):
         full = text(_BY_ANY_NAME.get(name, name), "name")
         if isinstance(value, bool | np.bool_):
             value = str(value).lower()
-        # A text holds every whole number, and the shortest text of a float is read back to the bit.
+        # A text represents every whole number, and the shortest text of a float is read back exactly.
         check(lib.skep_options_set_text(self._handle, full, text(str(value), name)))
 
     def __contains__(self, name: object) -> bool:
@@ -227,12 +227,12 @@ class Options(Mapping[str, Value]):
 
     def __getattr__(self, attribute: str) -> Value:
         if attribute not in _BY_ANY_NAME:
-            raise AttributeError(f"there is no option {attribute!r}")
+            raise AttributeError(f"no option {attribute!r}")
         return self[attribute]
 
     def __setattr__(self, attribute: str, value: Value) -> None:
         if attribute not in _BY_ANY_NAME:
-            raise AttributeError(f"there is no option {attribute!r}")
+            raise AttributeError(f"no option {attribute!r}")
         self[attribute] = value
 
     def __dir__(self) -> list[str]:
@@ -251,5 +251,5 @@ _TYPES = {name: _FROM_TEXT[Options.__annotations__[name.replace(".", "_")]] for 
 
 
 def handle(options: Options | None) -> Any:
-    """The options as the library takes them; None is the default preset."""
+    """The options for the library; None is the default preset."""
     return ffi.NULL if options is None else options._handle

@@ -210,7 +210,7 @@ class Result:
         return tuple(_until_refused(warning))
 
     def write_workspace(self, scene: Scene, folder: str | os.PathLike[str]) -> None:
-        """Writes what COLMAP calls a dense folder, less images/ and sparse/, which `Scene.write_colmap`
+        """Writes COLMAP's dense folder without images/ and sparse/, which `Scene.write_colmap`
         writes.
         """
         check(lib.skep_result_write_workspace(self._handle, scene._handle, path(folder, "folder")))

@@ -1,7 +1,7 @@
 """Long calls: progress and cancellation.
 
 The library calls back from threads of its own, where Python handles no signals, and while the calling thread
-waits in C it handles none either. So the call is made in a thread of its own, and the calling thread waits in
+waits in C it handles none either. So the call runs in a thread of its own, and the calling thread waits in
 Python: there it calls the progress function, and a signal's handler can raise, as KeyboardInterrupt does,
 which stops the call.
 """
@@ -38,26 +38,26 @@ class Progress:
     cycle: int
     """The cycle on this scale, counted from 0."""
     view: int
-    """The view that is worked on."""
+    """The current view."""
     view_count: int
 
 
 ProgressFunction = Callable[[Progress], object]
-"""Called in the thread that made the call, whenever there is news and it is idle. What is true cancels the
-call, which then raises `Cancelled`; an exception cancels it too, and is raised from it."""
+"""Called in the thread that made the call, with the latest progress. A true result cancels the call, which
+then raises `Cancelled`; an exception cancels it too, and is raised by the call."""
 
 
 class _Call:
     """A call under way in its own thread."""
 
     def __init__(self, call: Callable[[Any, Any, Any], int], kind: str) -> None:
-        self.news = threading.Condition()
+        self.changed = threading.Condition()
         self.latest: Progress | None = None
         self.cancelled = False
         self.ended = False
         self.found: Any = None
         self.failure: BaseException | None = None
-        # Not a daemon: the interpreter must not go away under the library's feet.
+        # Not a daemon: the interpreter must not end while the library uses it.
         self.thread = threading.Thread(target=self.make, args=(call, kind), name="skep")
 
     def make(self, call: Callable[[Any, Any, Any], int], kind: str) -> None:
@@ -69,12 +69,12 @@ class _Call:
             self.found = ffi.gc(out[0], getattr(lib, f"{kind}_destroy"))
         except BaseException as failure:
             self.failure = failure
-        with self.news:
+        with self.changed:
             self.ended = True
-            self.news.notify()
+            self.changed.notify()
 
     def receive(self, _user: Any, progress: Any) -> int:
-        with self.news:
+        with self.changed:
             self.latest = Progress(
                 done=progress.done,
                 phase=Phase(progress.phase),
@@ -83,15 +83,15 @@ class _Call:
                 view=progress.view,
                 view_count=progress.view_count,
             )
-            self.news.notify()
+            self.changed.notify()
             return int(self.cancelled)
 
     def report(self, function: ProgressFunction) -> None:
         """Calls the progress function with the latest progress until the call ends or is cancelled."""
         while not self.cancelled:
-            with self.news:
+            with self.changed:
                 while self.latest is None and not self.ended:
-                    self.news.wait()
+                    self.changed.wait()
                 progress, self.latest = self.latest, None
             if progress is None:
                 return
@@ -100,7 +100,7 @@ class _Call:
 
 
 def run(call: Callable[[Any, Any, Any], int], kind: str, progress: ProgressFunction | None) -> Any:
-    """Makes `call(progress_function, user, out)` and waits until it has ended; gives the object of this kind
+    """Runs `call(progress_function, user, out)` and waits until it has ended; returns the object of this kind
     that it created, or raises its error.
     """
     under_way = _Call(call, kind)
@@ -118,7 +118,7 @@ def run(call: Callable[[Any, Any, Any], int], kind: str, progress: ProgressFunct
 
 
 def _join(thread: threading.Thread) -> None:
-    """Waits for a call that has ended or is about to, whatever signals come meanwhile."""
+    """Waits for the end of a call, also when signal handlers raise meanwhile."""
     interruption: BaseException | None = None
     while thread.is_alive():
         try:

@@ -21,7 +21,7 @@ from ._options import Options
 class Scene:
     """Calibrated photographs and sparse points; `len(scene)` is the number of views.
 
-    Runs that were started with it keep what it was when they started.
+    A run uses the scene as it was when the run started.
     """
 
     __slots__ = ("_handle",)
@@ -68,7 +68,7 @@ class Scene:
         from 0 to 1; `order` is that of its channels. Rows may lie apart, as in a part of a larger image.
         """
         given = to_image(image, order)
-        # A view that was added stays: what could be refused later is tried before.
+        # An added view cannot be removed: everything that can fail is checked before.
         if mask is not None:
             _mask_rows(mask, given.array.shape[:2])
         if depth_range is not None:

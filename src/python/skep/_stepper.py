@@ -30,7 +30,7 @@ class Cycle:
     food_sources: int
     """Food sources of each pixel's colony."""
     iterations: int
-    """Rounds of bees."""
+    """Passes of employed, onlooker and scout bees."""
 
 
 @dataclass(frozen=True)
@@ -284,6 +284,6 @@ class Stepper:
 
 
 def _array(estimates: Sequence[Estimate | None]) -> tuple[Any, int]:
-    """Estimates as C takes them; the caller keeps them alive."""
+    """Estimates for C; the caller keeps them alive."""
     handles = [ffi.NULL if estimate is None else estimate._handle for estimate in estimates]
     return ffi.new("skep_estimate *[]", handles), len(handles)
