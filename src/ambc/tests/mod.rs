@@ -2,6 +2,7 @@
 
 mod bees;
 mod costs;
+mod initial_colony;
 mod local_plane;
 mod planes;
 mod search;
