@@ -320,12 +320,13 @@ size_t skep_last_error(char *buffer, size_t capacity);
  *       iteration; 0 fits no planes.
  *       number, 0 to 1, fraction of the inverse depth; default: 0.02, fast: 0.03, paper: 0
  *   search.depth_perturbation
- *       From the second cycle on, half the range of inverse depths in which food sources start around the
- *       previous estimate, halved each cycle; 0 starts them at random.
+ *       From the second cycle on, half the range of inverse depths in which food sources start around a
+ *       validated estimate, halved each cycle of a scale; 0 starts them at random. Around an estimate that is
+ *       not validated one starts so, unless there is a candidate of another view, and the others at random.
  *       number, 0 to 0.5, fraction of the inverse depth; default: 0.01, fast: 0.005, paper: 0
  *   search.normal_perturbation
  *       Half the side of the cube from which a vector is added to the normals of those food sources, halved
- *       each cycle.
+ *       each cycle of a scale.
  *       number, 0 to 10, length, of a unit normal; default: 0.3, paper: 0
  *   search.smoothness_reward
  *       Fitness bonus of a plane that comes from a validated neighbor, in the comparison only (section 5.6 of
