@@ -41,7 +41,7 @@ fn ctrl_c_during_the_writing_leaves_complete_files() {
     let dense = scene.path().join("dense");
     // The few files may be written before the signal arrives.
     let finished = status == Some(0);
-    assert!(finished || status == Some(130) && printed.contains("whole"), "{status:?} {printed}");
+    assert!(finished || status == Some(130) && printed.contains("complete"), "{status:?} {printed}");
     assert_eq!(finished, dense.join("report.json").exists(), "only finished runs have a report");
     let stereo = dense.join("stereo");
     // It may also arrive before the first file.
