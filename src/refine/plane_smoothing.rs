@@ -13,14 +13,15 @@
 //!
 //! with `(1 - e / 8)^8` for `exp(-e)`. The new inverse depth is the weighted mean of `p`, the new normal that
 //! of `n'`. Reads the validated planes and the gray values; changes depth and normal of validated planes.
-//! Each pass visits 12 neighbors of each pixel, whole rows at a time.
+//! Each pass visits 12 neighbors of each pixel, for eight pixels of a row at a time.
 //!
 //! Source: the bilateral filter (Tomasi and Manduchi, 1998), on planes.
 
 use super::stencil::{Border, PaddedMap};
 use super::{Domain, Filter, FilteredView, marked_pixels};
-use crate::geometry::{Offset, PlaneHypothesis};
+use crate::geometry::{Offset, PlaneHypothesis, Position};
 use crate::scene::{PixelEstimate, validated_planes};
+use crate::simd::LANES;
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -72,12 +73,14 @@ fn smooth_once(view: &FilteredView, planes: &mut [PixelEstimate], is_replaced: &
     let maps = PlaneMaps::new(view, planes);
     let rows = planes.par_chunks_mut(width).zip(is_replaced.par_chunks_mut(width));
     rows.enumerate().for_each(|(y, (row, is_replaced))| {
-        let sums = maps.sum_row(y, width);
-        for (x, estimate) in row.iter_mut().enumerate().filter(|(_, estimate)| estimate.validated) {
-            let mean = sums.mean(x);
-            if view.is_usable(mean, (x, y)) {
-                (estimate.depth, estimate.normal) = (mean.depth, mean.normal);
-                is_replaced[x] = true;
+        for left in (0..width).step_by(LANES) {
+            let sums = maps.sum((left, y));
+            for (lane, estimate) in row[left..].iter_mut().take(LANES).enumerate() {
+                let (x, mean) = (left + lane, sums.mean(lane));
+                if estimate.validated && view.is_usable(mean, (x, y)) {
+                    (estimate.depth, estimate.normal) = (mean.depth, mean.normal);
+                    is_replaced[x] = true;
+                }
             }
         }
     });
@@ -92,23 +95,21 @@ struct PlaneMaps {
     gray: PaddedMap,
 }
 
-/// The weighted sums of a row.
-struct RowSums {
-    weight: Vec<f32>,
-    inverse_depth: Vec<f32>,
-    normal: [Vec<f32>; 3],
+/// The weighted sums of adjacent pixels of a row, one in each lane. They are arrays of a known size, not
+/// slices, so that the compiler keeps them in vector registers and vectorizes the loops over lanes.
+#[derive(Default)]
+struct Sums {
+    weight: [f32; LANES],
+    inverse_depth: [f32; LANES],
+    normal: [[f32; LANES]; 3],
 }
 
-impl RowSums {
-    fn zeros(width: usize) -> RowSums {
-        let zeros = || vec![0.0; width];
-        RowSums { weight: zeros(), inverse_depth: zeros(), normal: std::array::from_fn(|_| zeros()) }
-    }
-
-    /// The mean plane at a column; NaN without any weight.
-    fn mean(&self, x: usize) -> PlaneHypothesis {
-        let normal = Vec3::from_array(std::array::from_fn(|axis| self.normal[axis][x]));
-        PlaneHypothesis { depth: self.weight[x] / self.inverse_depth[x], normal: normal.normalize_or_zero() }
+impl Sums {
+    /// The mean plane of a lane; NaN without any weight.
+    fn mean(&self, lane: usize) -> PlaneHypothesis {
+        let normal = Vec3::from_array(self.normal.map(|component| component[lane]));
+        let depth = self.weight[lane] / self.inverse_depth[lane];
+        PlaneHypothesis { depth, normal: normal.normalize_or_zero() }
     }
 }
 
@@ -129,36 +130,33 @@ impl PlaneMaps {
         }
     }
 
-    fn sum_row(&self, y: usize, width: usize) -> RowSums {
-        let mut sums = RowSums::zeros(width);
+    /// The sums over the neighbors of `LANES` pixels from this one on.
+    fn sum(&self, at: Position) -> Sums {
+        let mut sums = Sums::default();
         let radius = RADIUS as i32;
         for dy in (-radius..=radius).step_by(STEP) {
             for dx in (-radius..=radius).step_by(STEP) {
                 if dx * dx + dy * dy <= radius * radius + 1 {
-                    self.add_neighbors(&mut sums, y, (dx, dy));
+                    self.add_neighbors(&mut sums, at, (dx, dy));
                 }
             }
         }
         sums
     }
 
-    /// Adds the neighbors at an offset to the sums of a row.
-    fn add_neighbors(&self, sums: &mut RowSums, y: usize, offset: Offset) {
-        let width = sums.weight.len();
-        let center = self.inverse_depth.row(y, (0, 0), width);
-        let [cx, cy, cz] = [0, 1, 2].map(|axis| self.normal[axis].row(y, (0, 0), width));
-        let gray = self.gray.row(y, (0, 0), width);
-        let inverse_depth = self.inverse_depth.row(y, offset, width);
-        let [slope_x, slope_y] = [0, 1].map(|axis| self.slope[axis].row(y, offset, width));
-        let [nx, ny, nz] = [0, 1, 2].map(|axis| self.normal[axis].row(y, offset, width));
-        let other_gray = self.gray.row(y, offset, width);
+    /// Adds the neighbors at an offset.
+    #[inline(always)]
+    fn add_neighbors(&self, sums: &mut Sums, at: Position, offset: Offset) {
+        let center = self.inverse_depth.lanes(at, (0, 0));
+        let [cx, cy, cz] = [0, 1, 2].map(|axis| self.normal[axis].lanes(at, (0, 0)));
+        let gray = self.gray.lanes(at, (0, 0));
+        let inverse_depth = self.inverse_depth.lanes(at, offset);
+        let [slope_x, slope_y] = [0, 1].map(|axis| self.slope[axis].lanes(at, offset));
+        let [nx, ny, nz] = [0, 1, 2].map(|axis| self.normal[axis].lanes(at, offset));
+        let other_gray = self.gray.lanes(at, offset);
         let (dx, dy) = (offset.0 as f32, offset.1 as f32);
         let distance = (dx * dx + dy * dy) / (2.0 * SPATIAL_SIGMA * SPATIAL_SIGMA);
-        let [sum_x, sum_y, sum_z] = &mut sums.normal;
-        // Slices of one known length: the loop has no bounds checks and is vectorized.
-        let (weights, depths) = (&mut sums.weight[..width], &mut sums.inverse_depth[..width]);
-        let (sum_x, sum_y, sum_z) = (&mut sum_x[..width], &mut sum_y[..width], &mut sum_z[..width]);
-        for x in 0..width {
+        for x in 0..LANES {
             let predicted = inverse_depth[x] - slope_x[x] * dx - slope_y[x] * dy;
             // Infinite or NaN where the pixel itself has no validated plane: its sums are not used.
             let depth = (predicted - center[x]) / (center[x] * DEPTH_SIGMA);
@@ -172,11 +170,11 @@ impl PlaneMaps {
             let square = root * root;
             let fourth = square * square;
             let weight = fourth * fourth;
-            weights[x] += weight;
-            depths[x] += weight * predicted;
-            sum_x[x] += weight * nx[x];
-            sum_y[x] += weight * ny[x];
-            sum_z[x] += weight * nz[x];
+            sums.weight[x] += weight;
+            sums.inverse_depth[x] += weight * predicted;
+            sums.normal[0][x] += weight * nx[x];
+            sums.normal[1][x] += weight * ny[x];
+            sums.normal[2][x] += weight * nz[x];
         }
     }
 }

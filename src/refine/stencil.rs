@@ -3,9 +3,11 @@
 
 use crate::geometry::{Grid, Offset, Position};
 use crate::image::PackedImage;
+use crate::simd::LANES;
 use rayon::prelude::*;
 
-/// A map with a border of one value on all sides, so that loops over whole rows need no bounds checks.
+/// A map with a border of one value on all sides, so that loops over whole rows need no bounds checks. On the
+/// right the border fills the last [`LANES`] columns that the map begins.
 pub struct PaddedMap {
     border: usize,
     stride: usize,
@@ -24,7 +26,7 @@ pub struct Border {
 impl PaddedMap {
     /// The map with these values by pixel index.
     pub fn new(grid: Grid, border: Border, value: impl Fn(usize) -> f32 + Sync) -> PaddedMap {
-        let stride = grid.width + 2 * border.width;
+        let stride = grid.width.next_multiple_of(LANES) + 2 * border.width;
         let mut values = vec![border.value; stride * (grid.height + 2 * border.width)];
         let rows = values[border.width * stride..].par_chunks_exact_mut(stride).take(grid.height);
         rows.enumerate().for_each(|(y, row)| {
@@ -36,11 +38,23 @@ impl PaddedMap {
     }
 
     /// `width` values of row `y + dy` from column `dx` on; offsets are limited to the width of the border.
-    // Inlined, so that loops over several rows see that all have the same length, and are vectorized.
     #[inline(always)]
-    pub fn row(&self, y: usize, (dx, dy): Offset, width: usize) -> &[f32] {
+    pub fn row(&self, y: usize, offset: Offset, width: usize) -> &[f32] {
+        &self.values[self.index((0, y), offset)..][..width]
+    }
+
+    /// The values of `LANES` pixels from `x + dx` on in row `y + dy`; `x` is a multiple of `LANES` inside the
+    /// map, offsets are limited to the width of the border.
+    #[inline(always)]
+    pub fn lanes(&self, at: Position, offset: Offset) -> &[f32; LANES] {
+        let index = self.index(at, offset);
+        self.values[index..].first_chunk().expect("the border fills the last lanes")
+    }
+
+    #[inline(always)]
+    fn index(&self, (x, y): Position, (dx, dy): Offset) -> usize {
         let row = (y + self.border).wrapping_add_signed(dy as isize);
-        &self.values[row * self.stride + self.border.wrapping_add_signed(dx as isize)..][..width]
+        row * self.stride + (x + self.border).wrapping_add_signed(dx as isize)
     }
 }
 
@@ -121,6 +135,8 @@ mod tests {
         assert_eq!(map.row(0, (-2, 1), 3), [-1.0, -1.0, 3.0]);
         assert_eq!(map.row(0, (0, -2), 3), [-1.0; 3]);
         assert_eq!(map.row(1, (2, 2), 3), [-1.0; 3]);
+        assert_eq!(map.lanes((0, 1), (-2, -1)), &[-1.0, -1.0, 0.0, 1.0, 2.0, -1.0, -1.0, -1.0]);
+        assert_eq!(map.lanes((0, 1), (2, 2)), &[-1.0; LANES]);
     }
 
     #[test]
