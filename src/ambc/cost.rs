@@ -181,7 +181,8 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         foods.swap(0, best.0);
     }
 
-    /// The mean of `1 - NCC` over the views that have the hypothesis in their image: the confidence.
+    /// The mean of `1 - NCC` over the views that have the hypothesis in their image: the cost of final
+    /// planes.
     #[inline(always)]
     pub fn mean_photometric_cost(&mut self, food: &FoodSource) -> f32 {
         self.project(food);

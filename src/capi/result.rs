@@ -33,7 +33,8 @@ pub const SKEP_PIXEL_VALIDATED: u8 = 0;
 pub const SKEP_PIXEL_MASKED: u8 = 1;
 /// The variance in the window around the pixel is too small for matching.
 pub const SKEP_PIXEL_NO_TEXTURE: u8 = 2;
-/// The plane is visible in fewer than two source views.
+/// There is no plane, or it is visible in fewer source views than matching needs: two, or one with option
+/// "check.min_consistent_views" = 1.
 pub const SKEP_PIXEL_NO_SOURCES: u8 = 3;
 /// Too few source views are consistent with the plane.
 pub const SKEP_PIXEL_INCONSISTENT: u8 = 4;

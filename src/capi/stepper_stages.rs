@@ -168,9 +168,9 @@ pub unsafe extern "C" fn skep_stepper_search(
 ///   1. consistency check: compares the planes with those of the source views; writes the
 ///      number of consistent views, and which planes are validated
 ///   2. correction of foreground fattening, if the scale may end with this cycle (option
-///      "refine.fattening_passes"): gives pixels beside a depth edge the plane of the surface that their gray
-///      values belong to, or none; changes depths and normals, and in the last
-///      cycle takes the validation of some
+///      "refine.fattening_passes"): gives validated pixels beside a depth edge the plane of the surface
+///      behind where their gray values are closer to it; in the last cycle some keep their plane and lose
+///      their validation
 ///   3. plane smoothing (option "refine.smoothing_passes"): changes depths and normals
 ///   4. publication of the validated surface, which the searches of the next cycle and the averaging of
 ///      skep_stepper_finish read
@@ -267,8 +267,8 @@ pub unsafe extern "C" fn skep_stepper_upsample(
     })
 }
 
-/// Gets the cycle that follows a cycle. A scale ends early when the fraction of changed pixels in all given
-/// estimates is below option "schedule.min_changed_fraction".
+/// Gets the cycle that follows a cycle. From its second cycle on, a scale ends early when the fraction of
+/// changed pixels in all given estimates is below option "schedule.min_changed_fraction".
 ///
 /// Reads the numbers of changed pixels only.
 ///

@@ -1,9 +1,9 @@
 //! Bilaterally weighted normalized cross-correlation (NCC) of a reference patch with its image in a source
 //! view.
 
-// This file is the innermost loop of the crate: with the default options a run computes some 200 patch costs
-// per pixel. The computation is the textbook's, and small. For a reference pixel p, a window of offsets o, a
-// source view and the homography H that the hypothesis (a plane) induces between the two images, in
+// This file is the innermost loop of the crate: with the default options a run computes some 150 to 200 patch
+// costs per pixel. The computation is the textbook's, and small. For a reference pixel p, a window of offsets
+// o, a source view and the homography H that the hypothesis (a plane) induces between the two images, in
 // pseudo-code:
 //
 //     for o in window, if p + o lies in the reference image:
@@ -21,9 +21,9 @@
 //     return clamp(1 - cov / sqrt(var_a * var_b), 0, 2)
 //
 // A scalar loop that does just this takes 380 ns for a patch of 36 samples. The code below computes the same
-// cost, up to rounding, with five deviations: the second truncates sample positions, the others change layout
-// and order only. Each says what it buys: in ns per patch, or as the time of a whole run with it over that
-// without it.
+// cost with five deviations: the second truncates sample positions to 1/256 px, the others change layout and
+// order only, and rounding. Each says what it buys: in ns per patch, or as the time of a whole run with it
+// over that without it.
 //
 // 1. Packed taps. The source image is not an array of gray values but of pairs of bytes, a pixel and the one
 //    below it (`Taps`), so that one 32-bit load brings the 2 x 2 pixels of a bilinear sample. With AVX2 a

@@ -161,8 +161,9 @@ options! {
         /// iteration; 0 fits no planes.
         local_plane_tolerance: number(0.0 to 1.0) "fraction of the inverse depth",
         /// From the second cycle on, half the range of inverse depths in which food sources start around a
-        /// validated estimate, halved each cycle of a scale; 0 starts them at random. Around an estimate that is
-        /// not validated one starts so, unless there is a candidate of another view, and the others at random.
+        /// validated estimate, halved each cycle of a scale; 0 starts them at random. Around an estimate that
+        /// is not validated one starts so, unless there is a candidate of another view, and the others at
+        /// random.
         depth_perturbation: number(0.0 to 0.5) "fraction of the inverse depth",
         /// Half the side of the cube from which a vector is added to the normals of those food sources,
         /// halved each cycle of a scale.

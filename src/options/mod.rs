@@ -93,7 +93,8 @@ const OTHERS: &[Entry] = &[
     },
     Entry {
         c_name: c"schedule.min_changed_fraction",
-        explanation: "A scale ends early once fewer than this fraction of the pixels changed in a cycle.",
+        explanation: "From the second cycle of a scale on, the scale ends early once fewer than this \
+                      fraction of the pixels changed their depth.",
         unit: "fraction of the pixels",
         kind: Kind::Number { min: 0.0, max: 1.0 },
         get: |options| options.schedule.min_changed_fraction,

@@ -23,8 +23,8 @@ impl Options {
         }
     }
 
-    /// The paper as literally as its text allows; the documentation of each option says what the paper leaves
-    /// open.
+    /// The paper as literally as its text allows; the table at the end of how_it_works
+    /// says where the paper leaves something open.
     pub fn paper() -> Options {
         Options {
             seed: 0,

@@ -30,7 +30,8 @@ pub struct ScheduleOptions {
     /// food_sources=2 iterations=1+2x1` is half size with 3 food sources a pixel, 5 iterations in the first
     /// cycle and 4 more cycles of 1, then full size.
     pub scales: Vec<Scale>,
-    /// A scale ends early once fewer than this fraction of the pixels changed in a cycle.
+    /// From the second cycle of a scale on, the scale ends early once fewer than this fraction of the pixels
+    /// changed their depth.
     ///
     /// fraction of the pixels; 0 to 1
     pub min_changed_fraction: f64,

@@ -114,8 +114,8 @@ impl RunContext {
         (0..self.views()).filter(has_view).filter_map(donor).collect()
     }
 
-    /// The cycle after this one, whose records these are; `None` after the last. A scale ends early once
-    /// fewer pixels changed than the option `schedule.min_changed_fraction` asks for.
+    /// The cycle after this one, whose records these are; `None` after the last. From its second cycle on,
+    /// a scale ends early once fewer pixels changed than the option `schedule.min_changed_fraction` asks for.
     pub fn next_cycle<'e>(
         &self,
         cycle: usize,

@@ -1,8 +1,9 @@
 //! A run, stage by stage (section 3 of the paper and beyond).
 //!
-//! What a stage changes is in its name and signature, and what it reads of other views is in the types of its
-//! inputs: checked planes, searched planes, or published surfaces. A stage of one view needs nothing else of
-//! other views: it can run in this process or in another, from memory or from files.
+//! What a stage changes is in its name and signature, and what it reads of the estimates of other views is in
+//! the types of its inputs: checked planes, searched planes, or published surfaces. Images and cameras of all
+//! views are in the context. A stage of one view needs nothing else of other views: it can run in this
+//! process or in another, from memory or from files.
 
 mod context;
 mod cycle;

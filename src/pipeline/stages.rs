@@ -69,8 +69,8 @@ pub fn upsampled(context: &RunContext, at: Place, own: &ViewEstimate<Checked>) -
     ViewEstimate { at, map, counts: own.counts, cycles: own.cycles.clone(), stage: Checked { surface } }
 }
 
-/// The candidates for the pixels of a view without a validated plane: the consistent planes of the views that
-/// have it among their sources (section 5.6.1 of the paper).
+/// The candidates for the pixels of a view without a validated plane: of the planes of the views that have it
+/// among their sources, those that at least one source view confirms (section 5.6.1 of the paper).
 pub fn propagate(
     context: &RunContext,
     at: Place,
@@ -315,8 +315,8 @@ pub fn recheck(
     Ok(FilledGaps(confirmed.collect()))
 }
 
-/// Determines view set, confidence and status of every pixel. Reads images and published surfaces of the
-/// sources.
+/// Determines view set, cost (mean of 1 - NCC) and status of every pixel. Reads images and published surfaces
+/// of the sources.
 pub fn classify(
     context: &RunContext,
     problem: &Problem,

@@ -7,7 +7,8 @@ use crate::scene::{PixelEstimate, PixelStatus, ScaledView};
 /// Relative distance to an end of the depth range within which a depth counts as limited by it.
 const AT_RANGE_END: f32 = 1e-3;
 
-/// The status of each pixel of a view; a plane must be visible in `min_views` source views to be validated.
+/// The status of each pixel of a view; a plane that is not validated and visible in fewer than
+/// `min_views` source views has no sources.
 pub fn classify(
     view: &ScaledView,
     planes: &[PixelEstimate],

@@ -96,9 +96,10 @@ impl Stepper {
         Ok(stages::upsampled(&self.0, at, estimate))
     }
 
-    /// The candidates for the pixels of a view that have no validated plane: the consistent planes of other
-    /// views. None in a scale's first cycle. Reads the checked planes of the view itself and of the views
-    /// that have it among their sources, on the scale of the cycle.
+    /// The candidates for the pixels of a view that have no validated plane: of the planes of other views
+    /// that at least one source view confirms, the one of lowest cost. None in a scale's first cycle. Reads
+    /// the checked planes of the view itself and of the views that have it among their sources, on the scale
+    /// of the cycle.
     ///
     /// # Errors
     /// A cycle or view that does not exist; estimates whose scale, scene or view does not match their entry.
@@ -171,9 +172,9 @@ impl Stepper {
         Ok(stages::publish(&self.0, checked))
     }
 
-    /// The cycle that follows this one; `None` after the last. Call it after this cycle is finished for all
-    /// views. A scale ends early once the fraction of changed pixels of the given estimates is below the
-    /// option `schedule.min_changed_fraction`.
+    /// The cycle that follows this one; `None` after the last. Call it once every view is checked
+    /// in this cycle. From its second cycle on, a scale ends early once the fraction of changed pixels of the
+    /// given estimates is below the option `schedule.min_changed_fraction`.
     ///
     /// # Errors
     /// A cycle that does not exist; estimates of another scale.
@@ -185,8 +186,8 @@ impl Stepper {
     }
 
     /// The result of a view after the last cycle: averages validated planes across views, fills small gaps
-    /// where the sources confirm them, and determines view set, confidence and status of every pixel. Reads
-    /// the published surfaces of the view's sources, and their checked planes.
+    /// where the sources confirm them, and determines view set, cost (mean of 1 - NCC) and status of every
+    /// pixel. Reads the published surfaces of the view's sources, and their checked planes.
     ///
     /// # Errors
     /// A view that does not exist; estimates that are not of full size, or whose scene or view does not match

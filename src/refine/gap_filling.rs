@@ -1,6 +1,7 @@
-//! Gap filling: after the last check, each pixel without a validated plane gets the plane of the surrounding
-//! surface whose pixels have the most similar gray values. The caller checks the new planes against the
-//! source views once more: most such pixels were close to that surface and failed the check by their normal.
+//! Gap filling: after the last check, each pixel whose plane is not validated gets the plane of the
+//! surrounding surface whose pixels have the most similar gray values. The caller checks the new planes
+//! against the source views once more: most such pixels were close to that surface and failed the check by
+//! their normal.
 //!
 //! Each validated neighbor predicts an inverse depth `w` at the pixel from its plane, with a bilateral
 //! weight. Neighbors whose predictions differ by less than `SAME_SURFACE` are one surface; the surface with

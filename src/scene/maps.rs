@@ -19,7 +19,8 @@ pub enum PixelStatus {
     Masked,
     /// The variance in the window around the pixel is too small for matching.
     NoTexture,
-    /// The plane is visible in fewer than two source views.
+    /// There is no plane, or it is visible in fewer source views than matching needs: two, or one with
+    /// `check.min_consistent_views` = 1.
     NoSources,
     /// Too few source views are consistent with the plane.
     Inconsistent,

@@ -35,7 +35,7 @@ class PixelStatus(IntEnum):
     NO_TEXTURE = lib.SKEP_PIXEL_NO_TEXTURE
     """The variance in the window around the pixel is too small for matching."""
     NO_SOURCES = lib.SKEP_PIXEL_NO_SOURCES
-    """The plane is visible in fewer than two source views."""
+    """No plane, or one visible in fewer than two source views (one with `check.min_consistent_views` = 1)."""
     INCONSISTENT = lib.SKEP_PIXEL_INCONSISTENT
     """Too few source views are consistent with the plane."""
     OUT_OF_RANGE = lib.SKEP_PIXEL_OUT_OF_RANGE
