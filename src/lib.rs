@@ -172,6 +172,8 @@
 
 // The library neither prints nor exits the process.
 #![warn(clippy::print_stdout, clippy::print_stderr, clippy::exit)]
+// `pub` is what the public API needs; everything else is `pub(crate)`.
+#![warn(unreachable_pub)]
 
 mod ambc;
 #[cfg(feature = "capi")]

@@ -14,10 +14,10 @@ use crate::scene::{PixelEstimate, PlaneMap};
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
 /// Contains the wall's depths with a margin.
-pub const RANGE: DepthRange = DepthRange { near: 2.0, far: 12.0 };
+pub(crate) const RANGE: DepthRange = DepthRange { near: 2.0, far: 12.0 };
 
 /// The first view is the reference, the others are its sources.
-pub struct World {
+pub(crate) struct World {
     pub cameras: Vec<Camera>,
     pub images: Vec<PackedImage>,
     /// The published surfaces of the sources; empty by default.
@@ -30,13 +30,13 @@ fn wall_normal() -> DVec3 {
 }
 
 /// Gray value of the wall's texture.
-pub fn gray(point: DVec3) -> u8 {
+pub(crate) fn gray(point: DVec3) -> u8 {
     let waves = (7.0 * point.x + 3.0 * point.y).sin() + (5.0 * point.y - 3.0 * point.x + 1.0).sin();
     (127.0 + 55.0 * waves).round() as u8
 }
 
 /// A sample of an approximate normal distribution with standard deviation 1.
-pub fn white(random: &mut Random) -> f32 {
+pub(crate) fn white(random: &mut Random) -> f32 {
     (0..12).map(|_| random.unit()).sum::<f32>() - 6.0
 }
 
@@ -47,23 +47,23 @@ fn wall(camera: &Camera) -> Plane {
 }
 
 /// Column and row of a pixel.
-pub fn place(camera: &Camera, pixel: usize) -> DVec2 {
+pub(crate) fn place(camera: &Camera, pixel: usize) -> DVec2 {
     let width = camera.width as usize;
     DVec2::new((pixel % width) as f64, (pixel / width) as f64)
 }
 
 /// Depth of the wall at a pixel.
-pub fn depth(camera: &Camera, pixel: usize) -> f32 {
+pub(crate) fn depth(camera: &Camera, pixel: usize) -> f32 {
     wall(camera).depth(camera, place(camera, pixel)) as f32
 }
 
 /// Unit normal of the wall in a camera's frame.
-pub fn normal(camera: &Camera) -> Vec3 {
+pub(crate) fn normal(camera: &Camera) -> Vec3 {
     wall(camera).normal.as_vec3()
 }
 
 /// The wall at every pixel, each plane consistent with one source and not validated, at a cost of 0.1.
-pub fn exact(camera: &Camera) -> PlaneMap {
+pub(crate) fn exact(camera: &Camera) -> PlaneMap {
     let plane = |pixel| PixelEstimate {
         depth: depth(camera, pixel),
         normal: normal(camera),
@@ -76,7 +76,7 @@ pub fn exact(camera: &Camera) -> PlaneMap {
 
 /// A camera at `x` on a horizontal line in front of the wall, turned so that it sees the same part of the
 /// wall.
-pub fn camera(x: f64, (width, height): (u32, u32)) -> Camera {
+pub(crate) fn camera(x: f64, (width, height): (u32, u32)) -> Camera {
     let rotation = DMat3::from_rotation_y((x / 5.0).atan());
     Camera {
         width,
@@ -92,7 +92,7 @@ pub fn camera(x: f64, (width, height): (u32, u32)) -> Camera {
 
 impl World {
     /// Cameras at these positions on the line with images of this size.
-    pub fn new(places: &[f64], size: (u32, u32)) -> World {
+    pub(crate) fn new(places: &[f64], size: (u32, u32)) -> World {
         let cameras: Vec<Camera> = places.iter().map(|&x| camera(x, size)).collect();
         let image = |camera: &Camera| {
             let point = |pixel| camera.unproject(place(camera, pixel), f64::from(depth(camera, pixel)));
@@ -107,12 +107,12 @@ impl World {
     }
 
     /// Five cameras whose images mostly overlap.
-    pub fn five() -> World {
+    pub(crate) fn five() -> World {
         World::new(&[0.0, 0.8, -0.8, 1.4, -1.4], (36, 28))
     }
 
     /// The first view with all others as sources.
-    pub fn problem(&self) -> Problem<'_> {
+    pub(crate) fn problem(&self) -> Problem<'_> {
         let mut problem = Problem::new(&self.cameras[0], &self.images[0], RANGE);
         for view in 1..self.cameras.len() {
             let (image, surface) = (&self.images[view], &self.surfaces[view]);
@@ -122,23 +122,23 @@ impl World {
     }
 
     /// The exact planes of all views.
-    pub fn exact(&self) -> Vec<PlaneMap> {
+    pub(crate) fn exact(&self) -> Vec<PlaneMap> {
         self.cameras.iter().map(exact).collect()
     }
 
     /// View sets of the first view's pixels that hold all sources.
-    pub fn all_views(&self) -> ViewSets {
+    pub(crate) fn all_views(&self) -> ViewSets {
         ViewSets::full(self.cameras[0].pixels(), self.cameras.len() - 1)
     }
 }
 
 /// The window of the tests.
-pub fn window() -> Window {
+pub(crate) fn window() -> Window {
     Window::new(5, 2, 5.0, 0.2, 1e-5)
 }
 
 /// A camera at `position` that looks at `target`, the x axis of its image horizontal.
-pub fn looking_at(position: DVec3, target: DVec3, (width, height): (u32, u32), focal: f64) -> Camera {
+pub(crate) fn looking_at(position: DVec3, target: DVec3, (width, height): (u32, u32), focal: f64) -> Camera {
     let forward = (target - position).normalize();
     let right = DVec3::Y.cross(forward).normalize();
     let rotation = DMat3::from_cols(right, forward.cross(right), forward).transpose();
@@ -155,7 +155,7 @@ pub fn looking_at(position: DVec3, target: DVec3, (width, height): (u32, u32), f
 }
 
 /// These options with a change.
-pub fn changed(mut options: Options, change: impl FnOnce(&mut Options)) -> Options {
+pub(crate) fn changed(mut options: Options, change: impl FnOnce(&mut Options)) -> Options {
     change(&mut options);
     options
 }

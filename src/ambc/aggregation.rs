@@ -5,11 +5,11 @@ use crate::simd::{LANES, Simd};
 use std::cmp::Ordering;
 
 /// The largest k of the option `cost.best_views`.
-pub const MAX_BEST_VIEWS: usize = 8;
+pub(super) const MAX_BEST_VIEWS: usize = 8;
 
 /// The current hypothesis in the source views of a group.
 #[derive(Debug, Clone, Copy)]
-pub struct GroupCosts {
+pub(super) struct GroupCosts {
     /// Its projections into the views.
     pub projections: Projections,
     /// Lower bound of its cost in each view that has it in its image: the geometric term, and the photometric
@@ -19,14 +19,14 @@ pub struct GroupCosts {
 
 /// Number of views that have the hypothesis in their image.
 #[inline(always)]
-pub fn count_visible(groups: &[GroupCosts]) -> usize {
+pub(super) fn count_visible(groups: &[GroupCosts]) -> usize {
     groups.iter().map(|group| group.projections.inside.count_ones() as usize).sum()
 }
 
 /// The rank of a view: the number of views in which the hypothesis costs less; of equal costs the earlier is
 /// lower.
 #[inline(always)]
-pub fn rank_of<S: Simd>(simd: S, groups: &[GroupCosts], group: usize, lane: usize) -> usize {
+pub(super) fn rank_of<S: Simd>(simd: S, groups: &[GroupCosts], group: usize, lane: usize) -> usize {
     let cost = simd.splat(groups[group].costs[lane]);
     let mut rank = 0;
     for (other, GroupCosts { projections, costs }) in groups.iter().enumerate() {
@@ -45,7 +45,7 @@ pub fn rank_of<S: Simd>(simd: S, groups: &[GroupCosts], group: usize, lane: usiz
 
 /// The sum of the costs in the views that have the hypothesis in their image.
 #[inline(always)]
-pub fn sum<S: Simd>(simd: S, groups: &[GroupCosts]) -> f32 {
+pub(super) fn sum<S: Simd>(simd: S, groups: &[GroupCosts]) -> f32 {
     let zero = simd.splat(0.0);
     let mut sum = zero;
     for GroupCosts { projections, costs } in groups {
@@ -56,7 +56,7 @@ pub fn sum<S: Simd>(simd: S, groups: &[GroupCosts]) -> f32 {
 
 /// The sum of the `best` smallest of those `count` costs.
 #[inline(always)]
-pub fn sum_of_best<S: Simd>(simd: S, groups: &[GroupCosts], count: usize, best: usize) -> f32 {
+pub(super) fn sum_of_best<S: Simd>(simd: S, groups: &[GroupCosts], count: usize, best: usize) -> f32 {
     if count == best {
         return sum(simd, groups);
     }

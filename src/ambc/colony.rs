@@ -6,7 +6,7 @@ use glam::Vec3;
 
 /// A plane that another view propagates to a pixel; depth 0 where there is none.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Candidate {
+pub(crate) struct Candidate {
     /// Depth at the pixel.
     pub depth: f32,
     /// Unit normal in the camera frame.
@@ -18,7 +18,7 @@ pub struct Candidate {
 /// The colonies of one color of the checkerboard. While one color is searched, the other is only read: the
 /// result does not depend on the order of the pixels.
 #[derive(Debug, Clone)]
-pub struct Colonies {
+pub(super) struct Colonies {
     /// The pixels of the image.
     pub grid: Grid,
     /// Food sources of each colony, the best first.
@@ -29,26 +29,26 @@ pub struct Colonies {
 
 impl Colonies {
     /// Colonies without planes.
-    pub fn new(grid: Grid, food_sources: usize) -> Colonies {
+    pub(super) fn new(grid: Grid, food_sources: usize) -> Colonies {
         let none = FoodSource::new(0.0, Vec3::ZERO);
         let foods = vec![none; grid.width.div_ceil(2) * grid.height * food_sources];
         Colonies { grid, food_sources, foods }
     }
 
     /// Food sources of a row of colonies.
-    pub fn row_len(&self) -> usize {
+    pub(super) fn row_len(&self) -> usize {
         self.grid.width.div_ceil(2) * self.food_sources
     }
 
     /// The best food source of a pixel of this color.
     #[inline(always)]
-    pub fn best(&self, (x, y): Position) -> &FoodSource {
+    pub(super) fn best(&self, (x, y): Position) -> &FoodSource {
         &self.foods[y * self.row_len() + x / 2 * self.food_sources]
     }
 }
 
 /// The color of a pixel: 0 or 1.
 #[inline(always)]
-pub fn color((x, y): Position) -> usize {
+pub(super) fn color((x, y): Position) -> usize {
     (x + y) % 2
 }

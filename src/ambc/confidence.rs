@@ -13,7 +13,7 @@ use crate::simd::{Simd, SimdLevel, Task, dispatch};
 use crate::view_selection::{ViewRules, ViewSelector};
 
 /// The input: planes of a view and what they are matched with.
-pub struct ConfidenceTask<'a> {
+pub(crate) struct ConfidenceTask<'a> {
     /// The view and its sources, with their published surfaces.
     pub problem: &'a Problem<'a>,
     /// Shape and weights of the patches.
@@ -29,7 +29,7 @@ pub struct ConfidenceTask<'a> {
 }
 
 /// Confidence and view set of each pixel.
-pub struct Confidence {
+pub(crate) struct Confidence {
     /// Number of source views of the view.
     pub sources: usize,
     /// Mean `1 - NCC` over the view set, 0 to 2; 0 where there is no plane.
@@ -55,7 +55,7 @@ impl ConfidenceTask<'_> {
     ///
     /// # Errors
     /// What `advance` returns.
-    pub fn run(&self, planes: &[PixelEstimate]) -> Result<Confidence> {
+    pub(crate) fn run(&self, planes: &[PixelEstimate]) -> Result<Confidence> {
         dispatch(self.level, Run { task: self, planes })
     }
 }

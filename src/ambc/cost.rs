@@ -48,7 +48,7 @@ impl CostRules {
 }
 
 /// Evaluates hypotheses of one pixel after the other.
-pub struct Evaluator<'a, S: Simd> {
+pub(super) struct Evaluator<'a, S: Simd> {
     simd: S,
     problem: &'a Problem<'a>,
     window: &'a Window,
@@ -68,7 +68,12 @@ pub struct Evaluator<'a, S: Simd> {
 
 impl<'a, S: Simd> Evaluator<'a, S> {
     /// An evaluator without a pixel yet.
-    pub fn new(simd: S, problem: &'a Problem<'a>, window: &'a Window, rules: CostRules) -> Evaluator<'a, S> {
+    pub(super) fn new(
+        simd: S,
+        problem: &'a Problem<'a>,
+        window: &'a Window,
+        rules: CostRules,
+    ) -> Evaluator<'a, S> {
         Evaluator {
             simd,
             problem,
@@ -88,19 +93,19 @@ impl<'a, S: Simd> Evaluator<'a, S> {
 
     /// The reference view and its sources.
     #[inline(always)]
-    pub fn problem(&self) -> &'a Problem<'a> {
+    pub(super) fn problem(&self) -> &'a Problem<'a> {
         self.problem
     }
 
     /// The ray of the pixel.
     #[inline(always)]
-    pub fn ray(&self) -> Vec3 {
+    pub(super) fn ray(&self) -> Vec3 {
         self.ray
     }
 
     /// Makes this pixel the current one, matched in the source views of `set`.
     #[inline(always)]
-    pub fn set_pixel(&mut self, (x, y): Position, set: &[u32]) {
+    pub(super) fn set_pixel(&mut self, (x, y): Position, set: &[u32]) {
         self.patch.sample(self.simd, self.window, self.problem.image, x, y);
         self.has_texture = self.patch.has_texture(self.window);
         self.gray = self.problem.image.gray(x, y);
@@ -113,32 +118,32 @@ impl<'a, S: Simd> Evaluator<'a, S> {
 
     /// Loads the planes of the pixel's neighbors into the smoothness term.
     #[inline(always)]
-    pub fn load_neighbors(&mut self, neighbors: &Colonies, at: Position) {
+    pub(super) fn load_neighbors(&mut self, neighbors: &Colonies, at: Position) {
         self.smoothness.load_neighbors(self.problem, self.window, neighbors, at);
     }
 
     /// Similarity of the gray values of the current and another pixel, 0 to 1: their bilateral weight.
     #[inline(always)]
-    pub fn gray_similarity(&self, (x, y): Position) -> f32 {
+    pub(super) fn gray_similarity(&self, (x, y): Position) -> f32 {
         self.window.similarity(self.gray, self.problem.image.gray(x, y))
     }
 
     /// Whether the patch has the variance that matching needs.
     #[inline(always)]
-    pub fn has_texture(&self) -> bool {
+    pub(super) fn has_texture(&self) -> bool {
         self.has_texture
     }
 
     /// Whether the patch is textureless: its variance may be noise alone, and matching it determines nothing.
     #[inline(always)]
-    pub fn is_textureless(&self) -> bool {
+    pub(super) fn is_textureless(&self) -> bool {
         self.is_textureless
     }
 
     /// The cost of a hypothesis if it is below `bound`, else infinity: costs are not negative, so the sum
     /// over views ends as soon as it cannot stay below.
     #[inline(always)]
-    pub fn cost(&mut self, food: &FoodSource, bound: f32) -> f32 {
+    pub(super) fn cost(&mut self, food: &FoodSource, bound: f32) -> f32 {
         // A function of its own, also within what is compiled for the instruction set already: it is long,
         // and called from many places.
         let cost = self.simd.vectorize(
@@ -157,7 +162,12 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     /// Replaces a food source by `trial` if that is better, smoothness included; `reward` is a bonus on the
     /// trial's fitness.
     #[inline(always)]
-    pub fn replace_if_better(&mut self, food: &mut FoodSource, trial: &FoodSource, reward: f32) -> bool {
+    pub(super) fn replace_if_better(
+        &mut self,
+        food: &mut FoodSource,
+        trial: &FoodSource,
+        reward: f32,
+    ) -> bool {
         let bound =
             cost_to_beat(food.cost + self.smoothness.cost(food), reward) - self.smoothness.cost(trial);
         let cost = self.cost(trial, bound);
@@ -170,7 +180,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
 
     /// Swaps the best food source to the front, with its trial count. Of equals the earlier stays ahead.
     #[inline(always)]
-    pub fn best_first(&self, foods: &mut [FoodSource]) {
+    pub(super) fn best_first(&self, foods: &mut [FoodSource]) {
         let mut best = (0, f32::INFINITY);
         for (index, food) in foods.iter().enumerate() {
             let cost = food.cost + self.smoothness.cost(food);
@@ -184,7 +194,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     /// The mean of `1 - NCC` over the views that have the hypothesis in their image: the cost of final
     /// planes.
     #[inline(always)]
-    pub fn mean_photometric_cost(&mut self, food: &FoodSource) -> f32 {
+    pub(super) fn mean_photometric_cost(&mut self, food: &FoodSource) -> f32 {
         self.project(food);
         let plane = food.plane(self.problem, self.ray);
         let (mut sum, mut count) = (0.0, 0);
@@ -205,7 +215,7 @@ impl<'a, S: Simd> Evaluator<'a, S> {
     /// one: the views whose validated surfaces agree best with it or, where too few do, those in which it
     /// costs least.
     #[inline(always)]
-    pub fn keep_best_views(&mut self, food: &FoodSource, count: usize, set: &mut [u32]) -> f32 {
+    pub(super) fn keep_best_views(&mut self, food: &FoodSource, count: usize, set: &mut [u32]) -> f32 {
         let is_matched = self.rank_views(food, count);
         let kept = count_visible(&self.groups).min(count);
         if kept >= self.rules.min_views {

@@ -9,7 +9,7 @@ use crate::simd::Simd;
 /// Perturbs the first `count` food sources towards or away from another one of the colony, `y' = y + R(-1,1)
 /// (y_n - y)`, in depth or in normal with equal chance, and keeps the better of both.
 #[inline(always)]
-pub fn send<S: Simd>(
+pub(super) fn send<S: Simd>(
     evaluator: &mut Evaluator<S>,
     foods: &mut [FoodSource],
     count: usize,

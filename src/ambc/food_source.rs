@@ -9,7 +9,7 @@ use glam::Vec3;
 /// A plane at a pixel and what it costs there. It is stored as depth at its pixel and normal: the same plane
 /// at another pixel is a transfer, and clamping to the depth range is exact.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FoodSource {
+pub(super) struct FoodSource {
     /// Depth at the pixel.
     pub depth: f32,
     /// Unit normal in the camera frame, facing the camera.
@@ -25,14 +25,14 @@ pub struct FoodSource {
 impl FoodSource {
     /// A plane that is not evaluated yet.
     #[inline(always)]
-    pub fn new(depth: f32, normal: Vec3) -> FoodSource {
+    pub(super) fn new(depth: f32, normal: Vec3) -> FoodSource {
         FoodSource { depth, normal, cost: f32::INFINITY, trials: 0, validated: false }
     }
 
     /// A random plane: uniform in inverse depth within the given part (0 to 1) of the range, and over the
     /// visible hemisphere (section 5.1 of the paper).
     #[inline(always)]
-    pub fn random(problem: &Problem, ray: Vec3, random: &mut Random, part: (f32, f32)) -> FoodSource {
+    pub(super) fn random(problem: &Problem, ray: Vec3, random: &mut Random, part: (f32, f32)) -> FoodSource {
         let share = part.0 + (part.1 - part.0) * random.unit();
         let (nearest, farthest) = (1.0 / problem.range.near, 1.0 / problem.range.far);
         let inverse_depth = farthest + (nearest - farthest) * share;
@@ -42,7 +42,7 @@ impl FoodSource {
 
     /// A plane near this one.
     #[inline(always)]
-    pub fn perturbed(
+    pub(super) fn perturbed(
         &self,
         problem: &Problem,
         ray: Vec3,
@@ -59,7 +59,7 @@ impl FoodSource {
     /// The food source of a plane about the pixel with this ray, not evaluated yet; `None` where it is not
     /// usable.
     #[inline(always)]
-    pub fn of_plane(problem: &Problem, ray: Vec3, plane: &SlantedPlane) -> Option<FoodSource> {
+    pub(super) fn of_plane(problem: &Problem, ray: Vec3, plane: &SlantedPlane) -> Option<FoodSource> {
         let (depth, normal) = plane.depth_and_normal(ray, problem.inverse_focal);
         let is_usable = PlaneHypothesis { depth, normal }.is_usable(ray, &problem.range);
         is_usable.then(|| FoodSource::new(depth, normal))
@@ -67,13 +67,13 @@ impl FoodSource {
 
     /// Its plane written as inverse depth about its pixel.
     #[inline(always)]
-    pub fn plane(&self, problem: &Problem, ray: Vec3) -> SlantedPlane {
+    pub(super) fn plane(&self, problem: &Problem, ray: Vec3) -> SlantedPlane {
         SlantedPlane::new(self.depth, self.normal, ray, problem.inverse_focal)
     }
 
     /// The same plane at the pixel with ray `to`, `offset` pixels away; `None` where it is not usable.
     #[inline(always)]
-    pub fn transferred(
+    pub(super) fn transferred(
         &self,
         problem: &Problem,
         from: Vec3,
@@ -88,14 +88,14 @@ impl FoodSource {
 
 /// Fitness of a cost (equation 4 of the paper).
 #[inline(always)]
-pub fn fitness(cost: f32) -> f32 {
+pub(super) fn fitness(cost: f32) -> f32 {
     1.0 / (1.0 + cost)
 }
 
 /// The cost under which a food source with a fitness bonus `reward` beats one of this cost. The reward counts
 /// in this comparison only and is never stored (section 5.6 of the paper).
 #[inline(always)]
-pub fn cost_to_beat(cost: f32, reward: f32) -> f32 {
+pub(super) fn cost_to_beat(cost: f32, reward: f32) -> f32 {
     let needed = fitness(cost) - reward;
     if reward == 0.0 {
         cost

@@ -13,7 +13,7 @@ use crate::simd::Simd;
 use crate::view_selection::ViewSelector;
 
 /// The view sets of a pixel, as bits over the source list.
-pub struct PixelSets<'s> {
+pub(super) struct PixelSets<'s> {
     /// The source views that see its previous estimate; all without one.
     pub visible: &'s mut [u32],
     /// The part of them it is matched with in this search.
@@ -21,7 +21,7 @@ pub struct PixelSets<'s> {
 }
 
 /// Fills the colonies of one pixel after the other.
-pub struct InitialColony<'a, S: Simd> {
+pub(super) struct InitialColony<'a, S: Simd> {
     search: &'a Search<'a>,
     selector: ViewSelector<'a, S>,
     /// Evaluates the food sources.
@@ -30,7 +30,7 @@ pub struct InitialColony<'a, S: Simd> {
 
 impl<'a, S: Simd> InitialColony<'a, S> {
     /// For the pixels of a search.
-    pub fn new(simd: S, search: &'a Search<'a>) -> InitialColony<'a, S> {
+    pub(super) fn new(simd: S, search: &'a Search<'a>) -> InitialColony<'a, S> {
         let Search { problem, window, rules, .. } = search;
         InitialColony {
             search,
@@ -47,7 +47,13 @@ impl<'a, S: Simd> InitialColony<'a, S> {
     /// validated may be far off: random planes, stratified in inverse depth, take their place but for the
     /// second food source, unless that is a candidate.
     #[inline(always)]
-    pub fn fill(&mut self, at: Position, index: usize, colony: &mut [FoodSource], sets: PixelSets) -> bool {
+    pub(super) fn fill(
+        &mut self,
+        at: Position,
+        index: usize,
+        colony: &mut [FoodSource],
+        sets: PixelSets,
+    ) -> bool {
         let InitialColony { search, selector, evaluator } = self;
         let rules = &search.rules;
         let mut random = Random::new(search.random_stream, index as u64);

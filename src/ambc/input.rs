@@ -8,7 +8,7 @@ use crate::scene::PixelEstimate;
 use crate::simd::SimdLevel;
 
 /// The input of a search.
-pub struct Search<'a> {
+pub(crate) struct Search<'a> {
     /// The view and its sources, with their published surfaces.
     pub problem: &'a Problem<'a>,
     /// Shape and weights of the patches.

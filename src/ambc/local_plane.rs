@@ -18,7 +18,7 @@ const MIN_SCATTER: f32 = 1.0;
 /// source of this pixel up to a relative `tolerance`; `None` where they are too few or the plane is not
 /// usable.
 #[inline(always)]
-pub fn fit(
+pub(super) fn fit(
     problem: &Problem,
     neighbors: &Colonies,
     at: Position,

@@ -25,10 +25,10 @@ mod smoothness_term;
 #[cfg(test)]
 mod tests;
 
-pub use colony::Candidate;
-pub use confidence::{Confidence, ConfidenceTask};
+pub(crate) use colony::Candidate;
+pub(crate) use confidence::{Confidence, ConfidenceTask};
 pub use counts::Counts;
-pub use input::Search;
-pub use random::{Random, stream};
-pub use rules::{CostRules, SearchRules};
-pub use search::SearchResult;
+pub(crate) use input::Search;
+pub(crate) use random::{Random, stream};
+pub(crate) use rules::{CostRules, SearchRules};
+pub(crate) use search::SearchResult;

@@ -10,7 +10,7 @@ use crate::simd::Simd;
 
 /// The neighbors an onlooker may visit, all of the other checkerboard color: 1, 3 and 5 pixels along the
 /// axes, and a knight's move away.
-pub const OFFSETS: [Offset; 20] = [
+pub(super) const OFFSETS: [Offset; 20] = [
     (1, 0),
     (-1, 0),
     (0, 1),
@@ -40,7 +40,7 @@ const SAME_DEPTH: f32 = 1e-6;
 /// pixel, and keeps the better of both. A validated plane has a bonus in that comparison (section 5.6 of the
 /// paper).
 #[inline(always)]
-pub fn send<S: Simd>(
+pub(super) fn send<S: Simd>(
     evaluator: &mut Evaluator<S>,
     foods: &mut [FoodSource],
     neighbors: &Colonies,

@@ -6,13 +6,13 @@ use glam::Vec3;
 /// Draws for one visit of one pixel: a counter hashed with the run's seed, the view, scale, cycle and
 /// iteration (all in `stream`) and the pixel. There is no shared state.
 #[derive(Debug, Clone)]
-pub struct Random {
+pub(crate) struct Random {
     key: u64,
     draws: u64,
 }
 
 /// Hashes numbers into the name of a stream.
-pub fn stream(parts: &[u64]) -> u64 {
+pub(crate) fn stream(parts: &[u64]) -> u64 {
     parts.iter().fold(0, |key, &part| mix(key ^ mix(part.wrapping_add(INCREMENT))))
 }
 
@@ -30,7 +30,7 @@ fn mix(mut bits: u64) -> u64 {
 impl Random {
     /// The draws of a pixel in a stream.
     #[inline(always)]
-    pub fn new(stream: u64, pixel: u64) -> Random {
+    pub(crate) fn new(stream: u64, pixel: u64) -> Random {
         Random { key: mix(stream ^ mix(pixel.wrapping_add(INCREMENT))), draws: 0 }
     }
 
@@ -42,25 +42,25 @@ impl Random {
 
     /// Uniform in [0, 1).
     #[inline(always)]
-    pub fn unit(&mut self) -> f32 {
+    pub(crate) fn unit(&mut self) -> f32 {
         (self.next() >> 40) as f32 * (1.0 / (1u32 << 24) as f32)
     }
 
     /// `R(-1, 1)`: uniform in [-1, 1).
     #[inline(always)]
-    pub fn signed(&mut self) -> f32 {
+    pub(crate) fn signed(&mut self) -> f32 {
         2.0 * self.unit() - 1.0
     }
 
     /// Uniform below `count`, which must not be 0.
     #[inline(always)]
-    pub fn below(&mut self, count: usize) -> usize {
+    pub(crate) fn below(&mut self, count: usize) -> usize {
         ((u128::from(self.next()) * count as u128) >> 64) as usize
     }
 
     /// Uniform over the unit vectors that face the camera along `ray` (Marsaglia's method).
     #[inline(always)]
-    pub fn facing_normal(&mut self, ray: Vec3) -> Vec3 {
+    pub(crate) fn facing_normal(&mut self, ray: Vec3) -> Vec3 {
         // A point of the square lies in the disc with probability 0.785: 32 failures in a row do not happen.
         for _ in 0..32 {
             let (a, b) = (self.signed(), self.signed());

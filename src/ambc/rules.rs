@@ -5,7 +5,7 @@ use crate::view_selection::ViewRules;
 
 /// The rules of the search of one view in one cycle.
 #[derive(Debug, Clone, Copy)]
-pub struct SearchRules {
+pub(crate) struct SearchRules {
     /// The cost of a plane.
     pub cost: CostRules,
     /// The view set of a pixel.
@@ -31,7 +31,7 @@ pub struct SearchRules {
 
 /// Half the ranges in which planes are perturbed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Perturbation {
+pub(crate) struct Perturbation {
     /// Of the inverse depth, relative.
     pub depth: f32,
     /// Of each component of the normal.
@@ -40,7 +40,7 @@ pub struct Perturbation {
 
 /// The rules of the cost.
 #[derive(Debug, Clone, Copy)]
-pub struct CostRules {
+pub(crate) struct CostRules {
     /// Views whose mean is the cost; 0 takes the sum over all (equation 3 of the paper).
     pub best_views: usize,
     /// Hypotheses visible in fewer views cost infinitely much.
@@ -56,7 +56,7 @@ pub struct CostRules {
 /// The penalty of disagreement with the source views' validated surfaces, quadratic up to a limit: hypotheses
 /// that nearly agree are left to the images, and a wrong neighbor cannot rule out a good match.
 #[derive(Debug, Clone, Copy)]
-pub struct GeometricRules {
+pub(crate) struct GeometricRules {
     /// Cost of a squared relative depth error; 0 turns the term off.
     pub weight: f32,
     /// Relative depth error at the limit.
@@ -68,7 +68,7 @@ pub struct GeometricRules {
 /// The penalty of disagreement with neighbors, quadratic up to a limit: planes that nearly agree are left to
 /// the images.
 #[derive(Debug, Clone, Copy)]
-pub struct SmoothnessRules {
+pub(crate) struct SmoothnessRules {
     /// Cost at the limit against all four neighbors; 0 turns the term off.
     pub weight: f32,
     /// Relative depth error at the limit.
@@ -79,7 +79,7 @@ pub struct SmoothnessRules {
 
 /// How onlookers choose.
 #[derive(Debug, Clone, Copy)]
-pub struct OnlookerRules {
+pub(crate) struct OnlookerRules {
     /// Fitness bonus of validated planes (section 5.6 of the paper).
     pub reward: f32,
     /// Random neighbors of which the one of lowest cost is visited; the paper's onlookers visit the first.
@@ -88,7 +88,7 @@ pub struct OnlookerRules {
 
 impl SearchRules {
     /// The rules of a cycle on a scale; a guided search is one for which some view has a checked estimate.
-    pub fn new(options: &Options, scale: &Scale, cycle_on_scale: u32, is_guided: bool) -> SearchRules {
+    pub(crate) fn new(options: &Options, scale: &Scale, cycle_on_scale: u32, is_guided: bool) -> SearchRules {
         let search = &options.search;
         // The paper starts no set again: its cost is infinite then.
         let min_views = if options.cost.best_views == 0 { 0 } else { options.min_matched_views() };
@@ -117,7 +117,7 @@ impl SearchRules {
 
 impl CostRules {
     /// The rules of these options; the geometric term needs published surfaces.
-    pub fn new(options: &Options, with_geometric_term: bool) -> CostRules {
+    pub(crate) fn new(options: &Options, with_geometric_term: bool) -> CostRules {
         let cost = &options.cost;
         let weight = if with_geometric_term { cost.geom_consistency_weight } else { 0.0 };
         let max_error = cost.geom_consistency_max_error;

@@ -8,7 +8,7 @@ use crate::simd::Simd;
 /// Replaces the food source of the most failed attempts by a random one when they exceed the limit; never the
 /// best one, which is first.
 #[inline(always)]
-pub fn send<S: Simd>(
+pub(super) fn send<S: Simd>(
     evaluator: &mut Evaluator<S>,
     foods: &mut [FoodSource],
     trial_limit: u16,

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 const TILE_COLUMNS: usize = 64;
 
 /// The result of a search.
-pub struct SearchResult {
+pub(crate) struct SearchResult {
     /// The best plane of every pixel, `validated` where it comes from a validated one; depth 0 where the mask
     /// leaves the pixel out.
     pub planes: Vec<PixelEstimate>,
@@ -34,7 +34,7 @@ pub struct SearchResult {
 
 impl SearchResult {
     /// Of a view without sources: no pixel has a plane.
-    pub fn without_sources(pixels: usize) -> SearchResult {
+    pub(crate) fn without_sources(pixels: usize) -> SearchResult {
         SearchResult {
             planes: vec![PixelEstimate::default(); pixels],
             view_sets: ViewSets::empty(pixels, 0),
@@ -49,7 +49,7 @@ impl Search<'_> {
     ///
     /// # Errors
     /// What `advance` returns.
-    pub fn run(&self) -> Result<SearchResult> {
+    pub(crate) fn run(&self) -> Result<SearchResult> {
         dispatch(self.level, SearchTask(self))
     }
 

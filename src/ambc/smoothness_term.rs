@@ -15,7 +15,7 @@ use glam::Vec3;
 
 /// The planes that the neighbors predict for the current pixel.
 #[derive(Debug, Clone)]
-pub struct SmoothnessTerm {
+pub(super) struct SmoothnessTerm {
     rules: SmoothnessRules,
     predictions: [Prediction; NEIGHBORS.len()],
     count: usize,
@@ -35,14 +35,20 @@ const NEIGHBORS: [Offset; 4] = [(1, 0), (-1, 0), (0, 1), (0, -1)];
 
 impl SmoothnessTerm {
     /// A term without neighbors, which costs nothing.
-    pub fn new(rules: SmoothnessRules) -> SmoothnessTerm {
+    pub(super) fn new(rules: SmoothnessRules) -> SmoothnessTerm {
         let none = Prediction { depth: 1.0, normal: Vec3::NEG_Z, weight: 0.0 };
         SmoothnessTerm { rules, predictions: [none; NEIGHBORS.len()], count: 0 }
     }
 
     /// Takes the best planes of the neighbors of a pixel as predictions.
     #[inline(always)]
-    pub fn load_neighbors(&mut self, problem: &Problem, window: &Window, colonies: &Colonies, at: Position) {
+    pub(super) fn load_neighbors(
+        &mut self,
+        problem: &Problem,
+        window: &Window,
+        colonies: &Colonies,
+        at: Position,
+    ) {
         self.count = 0;
         if self.rules.weight == 0.0 {
             return;
@@ -68,7 +74,7 @@ impl SmoothnessTerm {
 
     /// The cost of a food source's disagreement with the neighbors.
     #[inline(always)]
-    pub fn cost(&self, food: &FoodSource) -> f32 {
+    pub(super) fn cost(&self, food: &FoodSource) -> f32 {
         let mut sum = 0.0;
         for prediction in &self.predictions[..self.count] {
             let depth = (prediction.depth / food.depth - 1.0).abs() / self.rules.max_depth_error;

@@ -6,6 +6,8 @@
 //! are written only after everything that can fail has been done.
 
 #![allow(unsafe_code, non_camel_case_types)]
+// cbindgen writes what is `pub` into the header.
+#![allow(unreachable_pub)]
 // What callers must uphold is said once, at the head of the header, in C's words.
 #![allow(clippy::missing_safety_doc)]
 

@@ -21,7 +21,7 @@ const MAX_DIFFERENCE: f32 = 0.01;
 
 /// Averages the validated planes of a view with the published surfaces of its sources; planes whose average
 /// is not usable stay. Returns the planes; the others are as they were.
-pub fn average(level: SimdLevel, problem: &Problem, planes: &[PixelEstimate]) -> Vec<PixelEstimate> {
+pub(crate) fn average(level: SimdLevel, problem: &Problem, planes: &[PixelEstimate]) -> Vec<PixelEstimate> {
     let mut averaged = planes.to_vec();
     dispatch(level, AverageTask { problem, planes: &mut averaged });
     averaged

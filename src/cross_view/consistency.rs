@@ -27,7 +27,7 @@ const RECHECK_TOLERANCE: f32 = 0.5;
 
 /// The thresholds of the check.
 #[derive(Debug, Clone, Copy)]
-pub struct ConsistencyRules {
+pub(crate) struct ConsistencyRules {
     depth_tolerance: f32,
     min_normal_cosine: f32,
     min_consistent_views: usize,
@@ -37,7 +37,7 @@ pub struct ConsistencyRules {
 
 /// How the depths of eight source views compare with that of a plane, as bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct DepthComparison {
+pub(crate) struct DepthComparison {
     /// The source views of the same depth.
     pub same: u8,
     /// Those that are not counted: their own depth is in front, and may occlude the point.
@@ -46,7 +46,7 @@ pub struct DepthComparison {
 
 impl ConsistencyRules {
     /// The thresholds of these options.
-    pub fn new(options: &CheckOptions) -> ConsistencyRules {
+    pub(crate) fn new(options: &CheckOptions) -> ConsistencyRules {
         ConsistencyRules {
             depth_tolerance: options.depth_tolerance as f32,
             min_normal_cosine: options.normal_tolerance.to_radians().cos() as f32,
@@ -57,14 +57,14 @@ impl ConsistencyRules {
     }
 
     /// The thresholds for planes that filled a gap.
-    pub fn for_recheck(self) -> ConsistencyRules {
+    pub(crate) fn for_recheck(self) -> ConsistencyRules {
         ConsistencyRules { depth_tolerance: RECHECK_TOLERANCE * self.depth_tolerance, ..self }
     }
 
     /// Compares the depths of a plane in eight source views' frames with the source views' own, 0 where they
     /// have none.
     #[inline(always)]
-    pub fn compare<S: Simd>(&self, simd: S, depth: S::F32, own: S::F32) -> DepthComparison {
+    pub(crate) fn compare<S: Simd>(&self, simd: S, depth: S::F32, own: S::F32) -> DepthComparison {
         let tolerance = simd.mul(simd.splat(self.depth_tolerance), depth);
         let (behind, in_front) = (simd.sub(own, depth), simd.sub(depth, own));
         let known = simd.simd_ge(own, simd.splat(f32::MIN_POSITIVE));
@@ -77,20 +77,20 @@ impl ConsistencyRules {
 
     /// Whether normals in the same frame are the same.
     #[inline(always)]
-    pub fn is_same_normal(&self, normal: Vec3, own: Vec3) -> bool {
+    pub(crate) fn is_same_normal(&self, normal: Vec3, own: Vec3) -> bool {
         normal.dot(own) > self.min_normal_cosine
     }
 
     /// Whether this many consistent views out of those counted validate a plane.
     #[inline(always)]
-    pub fn validates(&self, consistent: usize, counted: usize) -> bool {
+    pub(crate) fn validates(&self, consistent: usize, counted: usize) -> bool {
         consistent >= self.min_consistent_views
             && consistent as f32 >= self.min_consistent_fraction * counted as f32
     }
 }
 
 /// The check of the planes of a reference view against those of its source views.
-pub struct ConsistencyCheck<'a> {
+pub(crate) struct ConsistencyCheck<'a> {
     /// The reference view and its sources.
     pub problem: &'a Problem<'a>,
     /// The planes that are checked.
@@ -112,7 +112,7 @@ impl ConsistencyCheck<'_> {
     ///
     /// # Errors
     /// What `advance` returns.
-    pub fn run(&self) -> Result<Vec<Verdict>> {
+    pub(crate) fn run(&self) -> Result<Vec<Verdict>> {
         dispatch(self.level, CheckTask(self))
     }
 }

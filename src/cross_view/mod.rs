@@ -5,6 +5,6 @@ mod averaging;
 mod consistency;
 mod propagation;
 
-pub use averaging::average;
-pub use consistency::{ConsistencyCheck, ConsistencyRules};
-pub use propagation::{Donor, Target, candidates};
+pub(crate) use averaging::average;
+pub(crate) use consistency::{ConsistencyCheck, ConsistencyRules};
+pub(crate) use propagation::{Donor, Target, candidates};

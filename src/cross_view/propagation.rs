@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 /// A view whose planes are propagated.
 #[derive(Clone, Copy)]
-pub struct Donor<'a> {
+pub(crate) struct Donor<'a> {
     /// Its index in the scene: of candidates of equal cost that of the lowest view is taken.
     pub view: usize,
     /// Its camera on this scale.
@@ -22,7 +22,7 @@ pub struct Donor<'a> {
 
 /// The view that receives them.
 #[derive(Clone, Copy)]
-pub struct Target<'a> {
+pub(crate) struct Target<'a> {
     /// Its camera on this scale.
     pub camera: &'a Camera,
     /// Its checked planes: validated pixels receive nothing.
@@ -40,7 +40,7 @@ const BLOCK: usize = 1 << 13;
 ///
 /// # Errors
 /// What `advance` returns.
-pub fn candidates(target: &Target, donors: &[Donor], advance: Advance) -> Result<Vec<Candidate>> {
+pub(crate) fn candidates(target: &Target, donors: &[Donor], advance: Advance) -> Result<Vec<Candidate>> {
     let blocks: Vec<(&Donor, usize)> = (donors.iter())
         .flat_map(|donor| (0..donor.planes.len()).step_by(BLOCK).map(move |first| (donor, first)))
         .collect();

@@ -33,7 +33,7 @@ impl DepthRange {
 
 /// A [`DepthRange`] in f32, as the search uses it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SearchRange {
+pub(crate) struct SearchRange {
     /// The smallest depth.
     pub near: f32,
     /// The largest depth.
@@ -49,13 +49,13 @@ impl From<DepthRange> for SearchRange {
 impl SearchRange {
     /// Whether a depth lies in the range; false for NaN.
     #[inline(always)]
-    pub fn contains(&self, depth: f32) -> bool {
+    pub(crate) fn contains(&self, depth: f32) -> bool {
         depth >= self.near && depth <= self.far
     }
 
     /// The nearest depth in the range.
     #[inline(always)]
-    pub fn clamp(&self, depth: f32) -> f32 {
+    pub(crate) fn clamp(&self, depth: f32) -> f32 {
         depth.clamp(self.near, self.far)
     }
 }

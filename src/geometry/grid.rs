@@ -1,14 +1,14 @@
 //! The pixel grid of an image: indices, positions and neighbors of pixels.
 
 /// Column and row of a pixel.
-pub type Position = (usize, usize);
+pub(crate) type Position = (usize, usize);
 
 /// Offset between pixels, in columns and rows.
-pub type Offset = (i32, i32);
+pub(crate) type Offset = (i32, i32);
 
 /// The size of an image, whose pixels are numbered row by row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Grid {
+pub(crate) struct Grid {
     /// Pixels per row.
     pub width: usize,
     /// Number of rows.
@@ -17,25 +17,25 @@ pub struct Grid {
 
 impl Grid {
     /// Number of pixels.
-    pub fn pixels(self) -> usize {
+    pub(crate) fn pixels(self) -> usize {
         self.width * self.height
     }
 
     /// Index of the pixel at a position.
     #[inline(always)]
-    pub fn index(self, (x, y): Position) -> usize {
+    pub(crate) fn index(self, (x, y): Position) -> usize {
         y * self.width + x
     }
 
     /// Position of the pixel with this index.
     #[inline(always)]
-    pub fn position(self, index: usize) -> Position {
+    pub(crate) fn position(self, index: usize) -> Position {
         (index % self.width, index / self.width)
     }
 
     /// The position at an offset from another; `None` outside the image.
     #[inline(always)]
-    pub fn neighbor(self, (x, y): Position, (dx, dy): Offset) -> Option<Position> {
+    pub(crate) fn neighbor(self, (x, y): Position, (dx, dy): Offset) -> Option<Position> {
         // A negative coordinate wraps around to one larger than any image.
         let (x, y) = (x.wrapping_add_signed(dx as isize), y.wrapping_add_signed(dy as isize));
         (x < self.width && y < self.height).then_some((x, y))
@@ -43,7 +43,7 @@ impl Grid {
 
     /// Indices of the neighbors to the left, to the right, above and below; `None` outside the image.
     #[inline(always)]
-    pub fn four_neighbors(self, index: usize) -> [Option<usize>; 4] {
+    pub(crate) fn four_neighbors(self, index: usize) -> [Option<usize>; 4] {
         let (x, y) = self.position(index);
         [
             (x > 0).then(|| index - 1),

@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 /// Minimum of `-n . ray` for a plane that faces the camera: the homography of a plane at grazing incidence is
 /// unstable.
-pub const MIN_FACING: f32 = 0.02;
+pub(crate) const MIN_FACING: f32 = 0.02;
 
 /// A plane `n . X = -D` in the frame of a camera, with unit normal `n` facing the camera and `D > 0`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,7 +74,7 @@ impl SlantedPlane {
 /// A plane hypothesis of a pixel: depth at the pixel and normal. In this form clamping to the depth range is
 /// exact, and the hypothesis of another pixel has to be transferred.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct PlaneHypothesis {
+pub(crate) struct PlaneHypothesis {
     /// Depth at the pixel; 0 where there is no hypothesis.
     pub depth: f32,
     /// Unit normal in the camera frame, facing the camera.
@@ -85,7 +85,7 @@ impl PlaneHypothesis {
     /// Whether the depth lies in the range and the normal faces the camera along the pixel's ray by
     /// [`MIN_FACING`].
     #[inline(always)]
-    pub fn is_usable(&self, ray: Vec3, range: &SearchRange) -> bool {
+    pub(crate) fn is_usable(&self, ray: Vec3, range: &SearchRange) -> bool {
         range.contains(self.depth) && self.normal.dot(ray) < -MIN_FACING
     }
 }

@@ -4,7 +4,7 @@ use super::PackedImage;
 use crate::geometry::Grid;
 
 /// Mean gray value of the pixels at most `radius` columns and rows away.
-pub fn blurred(image: &PackedImage, pixel: usize, radius: usize) -> f32 {
+pub(crate) fn blurred(image: &PackedImage, pixel: usize, radius: usize) -> f32 {
     let grid = Grid { width: image.width, height: image.height };
     let (x, y) = grid.position(pixel);
     let (mut sum, mut count) = (0u32, 0u32);

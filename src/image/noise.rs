@@ -24,13 +24,13 @@ const FILTER_GAIN: f32 = 6.0;
 
 /// Variance of the noise per brightness bin, in squared gray values (0 to 255).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Noise([f32; BINS]);
+pub(crate) struct Noise([f32; BINS]);
 
 impl Noise {
     /// Estimates the noise from the flattest blocks, with a filter to which linear gradients are 0
     /// (Immerkaer, "Fast noise variance estimation", 1996): the second difference along x of the second
     /// difference along y.
-    pub fn estimate(picture: &Picture) -> Noise {
+    pub(crate) fn estimate(picture: &Picture) -> Noise {
         let (width, height) = (picture.width() as usize, picture.height() as usize);
         let gray = |x: usize, y: usize| i32::from(picture.gray()[y * width + x]);
         let mut deviations: [Vec<f32>; BINS] = Default::default();
@@ -66,13 +66,13 @@ impl Noise {
 
     /// Variance of the noise at a gray value.
     #[inline(always)]
-    pub fn variance(&self, gray: u8) -> f32 {
+    pub(crate) fn variance(&self, gray: u8) -> f32 {
         self.0[usize::from(gray) / GRAY_VALUES_PER_BIN]
     }
 }
 
 /// Standard deviation of the noise at a pixel, in gray values; 0 where it is not known.
-pub fn deviation(image: &PackedImage, pixel: usize) -> f32 {
+pub(crate) fn deviation(image: &PackedImage, pixel: usize) -> f32 {
     let (x, y) = Grid { width: image.width, height: image.height }.position(pixel);
     image.noise.variance(image.gray(x, y)).sqrt()
 }

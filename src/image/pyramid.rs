@@ -19,7 +19,7 @@ impl Picture {
 }
 
 /// The mask of the camera's image at half size: set where any of the 2 x 2 pixels is set.
-pub fn halve_mask(mask: &[bool], camera: &Camera) -> Vec<bool> {
+pub(crate) fn halve_mask(mask: &[bool], camera: &Camera) -> Vec<bool> {
     quadruples(camera.grid()).map(|pixels| pixels.iter().any(|&pixel| mask[pixel])).collect()
 }
 

@@ -7,7 +7,7 @@ use glam::{Mat3, Vec3};
 
 /// A matching problem: the reference view, whose maps are estimated, and its source views.
 #[derive(Debug, Clone)]
-pub struct Problem<'a> {
+pub(crate) struct Problem<'a> {
     /// Gray image of the reference view.
     pub image: &'a PackedImage,
     /// 1 / fx and 1 / fy, in 1 / px.
@@ -22,7 +22,7 @@ pub struct Problem<'a> {
 
 /// A source view: one that the reference view is matched with.
 #[derive(Debug, Clone)]
-pub struct Source<'a> {
+pub(crate) struct Source<'a> {
     /// Gray image of the source view.
     pub image: &'a PackedImage,
     /// Pose relative to the reference camera, in pixel coordinates.
@@ -37,7 +37,7 @@ pub struct Source<'a> {
 
 impl<'a> Problem<'a> {
     /// A reference view, without source views yet.
-    pub fn new(camera: &Camera, image: &'a PackedImage, range: DepthRange) -> Problem<'a> {
+    pub(crate) fn new(camera: &Camera, image: &'a PackedImage, range: DepthRange) -> Problem<'a> {
         Problem {
             image,
             inverse_focal: ((1.0 / camera.fx) as f32, (1.0 / camera.fy) as f32),
@@ -49,7 +49,7 @@ impl<'a> Problem<'a> {
 
     /// `K^-1 [x y 1]`: the ray of a pixel, with z = 1.
     #[inline(always)]
-    pub fn ray(&self, x: f32, y: f32) -> Vec3 {
+    pub(crate) fn ray(&self, x: f32, y: f32) -> Vec3 {
         Vec3::new(
             (x - self.principal.0) * self.inverse_focal.0,
             (y - self.principal.1) * self.inverse_focal.1,
@@ -60,7 +60,7 @@ impl<'a> Problem<'a> {
 
 impl<'a> Source<'a> {
     /// A source view with this camera, relative to the reference camera.
-    pub fn new(
+    pub(crate) fn new(
         reference: &Camera,
         camera: &Camera,
         image: &'a PackedImage,
@@ -80,7 +80,7 @@ impl<'a> Source<'a> {
 
 /// The pixel that a point projects to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Projection {
+pub(crate) struct Projection {
     /// Column in pixels.
     pub x: f32,
     /// Row in pixels.
@@ -90,7 +90,7 @@ pub struct Projection {
 impl Source<'_> {
     /// Dehomogenizes a point of the source view; `None` behind the camera or outside the image.
     #[inline(always)]
-    pub fn project(&self, point: Vec3) -> Option<Projection> {
+    pub(crate) fn project(&self, point: Vec3) -> Option<Projection> {
         let inverse = 1.0 / point.z;
         let (x, y) = (point.x * inverse, point.y * inverse);
         let (right, bottom) = ((self.image.width - 1) as f32, (self.image.height - 1) as f32);

@@ -11,14 +11,14 @@ use std::array::from_fn;
 
 /// Distance of prefetches, in pixels along a row: the search visits pixels along rows, and the next ones
 /// project some pixels further on. With prefetches a run takes 0.97 of the time.
-pub const PREFETCH_DISTANCE: usize = 16;
+pub(crate) const PREFETCH_DISTANCE: usize = 16;
 
 /// One value per source view of a group, in memory.
 type Lanes = [f32; LANES];
 
 /// Projects a pixel into the source views of its view set.
 #[derive(Debug, Clone)]
-pub struct SourceProjector<'a, S: Simd> {
+pub(crate) struct SourceProjector<'a, S: Simd> {
     simd: S,
     /// All source views, in the order of the reference view's source list.
     views: Vec<SourceConstants<'a>>,
@@ -48,7 +48,7 @@ struct SourceConstants<'a> {
 
 /// Up to eight source views, one per lane.
 #[derive(Debug, Clone)]
-pub struct Group<'a> {
+pub(crate) struct Group<'a> {
     /// Lanes in use: the first `count`.
     count: usize,
     /// Indices of the views in the reference view's source list.
@@ -67,7 +67,7 @@ pub struct Group<'a> {
 
 /// Projections of a point into the views of a group.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Projections {
+pub(crate) struct Projections {
     /// Homogeneous pixels; the third coordinate is the depth in the source view over that in the reference
     /// view.
     pub center: [Lanes; 3],
@@ -103,7 +103,7 @@ struct PublishedPlanes<S: Simd> {
 /// Validated planes of the views of a group in the coordinates of the reference view: a [`SlantedPlane`] per
 /// lane, about the current pixel.
 #[derive(Debug, Clone, Copy)]
-pub struct TransferredPlanes<S: Simd> {
+pub(crate) struct TransferredPlanes<S: Simd> {
     /// Inverse depth at the pixel.
     pub inverse_depth: S::F32,
     /// Change of the inverse depth per pixel along x.
@@ -116,7 +116,7 @@ pub struct TransferredPlanes<S: Simd> {
 
 /// Inverse depths of the validated surfaces of the views of a group at the projections of a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Surfaces {
+pub(crate) struct Surfaces {
     /// Inverse depth at the pixel nearest to the projection; 0 where there is no surface.
     pub nearest: Lanes,
     /// Inverse depth of that pixel's plane at the projection itself.
@@ -127,7 +127,7 @@ pub struct Surfaces {
 
 impl<'a, S: Simd> SourceProjector<'a, S> {
     /// A projector with an empty view set.
-    pub fn new(simd: S, reference: &Problem<'a>) -> SourceProjector<'a, S> {
+    pub(crate) fn new(simd: S, reference: &Problem<'a>) -> SourceProjector<'a, S> {
         let constants = |source: &Source<'a>| SourceConstants {
             infinite: source.pose.infinite,
             epipole: source.pose.epipole,
@@ -141,7 +141,7 @@ impl<'a, S: Simd> SourceProjector<'a, S> {
     }
 
     /// A projector whose view set holds all source views, at pixel (0, 0).
-    pub fn with_all_sources(simd: S, reference: &Problem<'a>) -> SourceProjector<'a, S> {
+    pub(crate) fn with_all_sources(simd: S, reference: &Problem<'a>) -> SourceProjector<'a, S> {
         let mut projector = SourceProjector::new(simd, reference);
         let mut all = vec![0; reference.sources.len().div_ceil(32)];
         ViewSets::fill_words(&mut all, reference.sources.len());
@@ -151,7 +151,7 @@ impl<'a, S: Simd> SourceProjector<'a, S> {
 
     /// Sets the current pixel and its view set.
     #[inline(always)]
-    pub fn set_pixel_and_views(&mut self, x: f32, y: f32, set: &[u32]) {
+    pub(crate) fn set_pixel_and_views(&mut self, x: f32, y: f32, set: &[u32]) {
         // Neighboring pixels often have the same set.
         if self.set == set {
             return self.set_pixel(x, y);
@@ -162,7 +162,7 @@ impl<'a, S: Simd> SourceProjector<'a, S> {
 
     /// Sets the current pixel and keeps the view set.
     #[inline(always)]
-    pub fn set_pixel(&mut self, x: f32, y: f32) {
+    pub(crate) fn set_pixel(&mut self, x: f32, y: f32) {
         self.pixel = (x, y);
         for group in &mut self.groups[..self.active] {
             group.set_pixel(self.simd, self.pixel);
@@ -171,7 +171,7 @@ impl<'a, S: Simd> SourceProjector<'a, S> {
 
     /// Sets the view set and keeps the current pixel.
     #[inline(always)]
-    pub fn set_views(&mut self, set: &[u32]) {
+    pub(crate) fn set_views(&mut self, set: &[u32]) {
         self.set.clear();
         self.set.extend_from_slice(set);
         let mut count = 0;
@@ -193,7 +193,7 @@ impl<'a, S: Simd> SourceProjector<'a, S> {
 
     /// The views of the set, ascending by index in the source list.
     #[inline(always)]
-    pub fn groups(&self) -> &[Group<'a>] {
+    pub(crate) fn groups(&self) -> &[Group<'a>] {
         &self.groups[..self.active]
     }
 }
@@ -252,13 +252,13 @@ impl<'a> Group<'a> {
 
     /// Indices of the views in the reference view's source list, one per lane in use.
     #[inline(always)]
-    pub fn sources(&self) -> &[usize] {
+    pub(crate) fn sources(&self) -> &[usize] {
         &self.sources[..self.count]
     }
 
     /// Projects the current pixel at a depth.
     #[inline(always)]
-    pub fn project<S: Simd>(&self, simd: S, depth: f32) -> Projections {
+    pub(crate) fn project<S: Simd>(&self, simd: S, depth: f32) -> Projections {
         let (zero, inverse_depth) = (simd.splat(0.0), simd.splat(1.0 / depth));
         let x = self.coordinate(simd, 0, inverse_depth);
         let y = self.coordinate(simd, 1, inverse_depth);
@@ -280,7 +280,7 @@ impl<'a> Group<'a> {
 
     /// The validated surfaces of the views at these projections.
     #[inline(always)]
-    pub fn surfaces<S: Simd>(&self, simd: S, projections: &Projections) -> Surfaces {
+    pub(crate) fn surfaces<S: Simd>(&self, simd: S, projections: &Projections) -> Surfaces {
         let pixels = self.nearest(simd, projections);
         let PublishedPlanes { inverse_depth, slope_x, slope_y, known } = self.published_planes(simd, &pixels);
         let change_x = simd.mul(slope_x, simd.sub(simd.load(&projections.column), pixels.column));
@@ -295,7 +295,11 @@ impl<'a> Group<'a> {
     /// The validated planes of the views at these projections, transferred to the current pixel of the
     /// reference view.
     #[inline(always)]
-    pub fn transfer_planes<S: Simd>(&self, simd: S, projections: &Projections) -> TransferredPlanes<S> {
+    pub(crate) fn transfer_planes<S: Simd>(
+        &self,
+        simd: S,
+        projections: &Projections,
+    ) -> TransferredPlanes<S> {
         let pixels = self.nearest(simd, projections);
         let planes = self.published_planes(simd, &pixels);
         // In the source view the pixel at inverse depth w is the homogeneous point h = at_infinity + w
@@ -315,7 +319,7 @@ impl<'a> Group<'a> {
 
     /// Indices of the pixels nearest to these projections, each in the image of its view.
     #[inline(always)]
-    pub fn nearest_pixels<S: Simd>(&self, simd: S, projections: &Projections) -> [u32; LANES] {
+    pub(crate) fn nearest_pixels<S: Simd>(&self, simd: S, projections: &Projections) -> [u32; LANES] {
         self.nearest(simd, projections).indices
     }
 
@@ -353,7 +357,7 @@ impl<'a> Group<'a> {
 
     /// `along_x` and `along_y` of the plane's [`PatchHomography`] to each view.
     #[inline(always)]
-    pub fn slopes<S: Simd>(&self, simd: S, plane: &SlantedPlane) -> [[Lanes; 3]; 2] {
+    pub(crate) fn slopes<S: Simd>(&self, simd: S, plane: &SlantedPlane) -> [[Lanes; 3]; 2] {
         let (slope_x, slope_y) = (simd.splat(plane.slope_x), simd.splat(plane.slope_y));
         let [along_x, along_y, _] = &self.infinite;
         let mut slopes = [[[0.0; LANES]; 3]; 2];
@@ -385,7 +389,7 @@ fn plane_at<S: Simd>(
 impl Projections {
     /// The homography to the view of a lane, given [`Group::slopes`].
     #[inline(always)]
-    pub fn homography(&self, [along_x, along_y]: &[[Lanes; 3]; 2], lane: usize) -> PatchHomography {
+    pub(crate) fn homography(&self, [along_x, along_y]: &[[Lanes; 3]; 2], lane: usize) -> PatchHomography {
         let of = |lanes: &[Lanes; 3]| Vec3::new(lanes[0][lane], lanes[1][lane], lanes[2][lane]);
         PatchHomography { center: of(&self.center), along_x: of(along_x), along_y: of(along_y) }
     }

@@ -16,7 +16,7 @@ pub(super) struct Warp<'a, S: Simd> {
 
 impl<'a, S: Simd> Warp<'a, S> {
     #[inline(always)]
-    pub fn new(simd: S, source: &'a PackedImage, homography: &PatchHomography) -> Warp<'a, S> {
+    pub(super) fn new(simd: S, source: &'a PackedImage, homography: &PatchHomography) -> Warp<'a, S> {
         Warp {
             center: splat(simd, homography.center),
             along_x: splat(simd, homography.along_x),
@@ -28,7 +28,7 @@ impl<'a, S: Simd> Warp<'a, S> {
     /// Positions of these offsets from the pixel. Where the third homogeneous coordinate is 0, the quotient
     /// is infinite or NaN and is clamped to the border of the image.
     #[inline(always)]
-    pub fn positions(&self, simd: S, dx: S::F32, dy: S::F32) -> S::SamplePositions<'a> {
+    pub(super) fn positions(&self, simd: S, dx: S::F32, dy: S::F32) -> S::SamplePositions<'a> {
         let [x, y, z] = self.center;
         let [step_x, step_y, step_z] = self.step(simd, dx, dy);
         self.positions_at(simd, [simd.add(x, step_x), simd.add(y, step_y), simd.add(z, step_z)])
@@ -36,7 +36,7 @@ impl<'a, S: Simd> Warp<'a, S> {
 
     /// Positions of these offsets and of their opposites.
     #[inline(always)]
-    pub fn mirrored_positions(&self, simd: S, dx: S::F32, dy: S::F32) -> [S::SamplePositions<'a>; 2] {
+    pub(super) fn mirrored_positions(&self, simd: S, dx: S::F32, dy: S::F32) -> [S::SamplePositions<'a>; 2] {
         let [x, y, z] = self.center;
         let [step_x, step_y, step_z] = self.step(simd, dx, dy);
         [
@@ -47,7 +47,7 @@ impl<'a, S: Simd> Warp<'a, S> {
 
     /// Position of the pixel itself, in all lanes.
     #[inline(always)]
-    pub fn center_position(&self, simd: S) -> S::SamplePositions<'a> {
+    pub(super) fn center_position(&self, simd: S) -> S::SamplePositions<'a> {
         self.positions_at(simd, self.center)
     }
 

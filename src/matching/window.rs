@@ -55,7 +55,7 @@ impl WindowVector {
 
     /// Gray values, minus 128, and spatial weights of the samples around a pixel whose window leaves the
     /// image: both are 0 for samples outside.
-    pub fn samples_inside(
+    pub(super) fn samples_inside(
         &self,
         image: &PackedImage,
         (x, y): Position,

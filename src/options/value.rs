@@ -101,11 +101,11 @@ pub(super) struct Entry {
 }
 
 impl Entry {
-    pub fn name(&self) -> &'static str {
+    pub(super) fn name(&self) -> &'static str {
         self.c_name.to_str().unwrap_or_default()
     }
 
-    pub fn value(&self, options: &Options) -> OptionValue {
+    pub(super) fn value(&self, options: &Options) -> OptionValue {
         let value = (self.get)(options);
         match self.kind {
             Kind::Count { .. } => OptionValue::Count(value as u64),
@@ -114,7 +114,7 @@ impl Entry {
         }
     }
 
-    pub fn info(&self) -> OptionInfo {
+    pub(super) fn info(&self) -> OptionInfo {
         OptionInfo {
             name: self.name(),
             explanation: self.explanation.trim_start(),

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 /// An image divided into bands of rows, the units of work of the threads.
 #[derive(Debug, Clone, Copy)]
-pub struct Bands {
+pub(crate) struct Bands {
     /// Pixels of a row.
     pub width: usize,
     /// Rows of every band but the last, which may have fewer.
@@ -24,13 +24,13 @@ const BANDS_PER_THREAD: usize = 8;
 
 impl Bands {
     /// Bands of an image for the threads of the current rayon pool.
-    pub fn new(width: usize, height: usize) -> Bands {
+    pub(crate) fn new(width: usize, height: usize) -> Bands {
         let rows = (height / (BANDS_PER_THREAD * rayon::current_num_threads())).clamp(MIN_ROWS, MAX_ROWS);
         Bands { width, rows }
     }
 
     /// Pixels of a band.
-    pub fn pixels(self) -> usize {
+    pub(crate) fn pixels(self) -> usize {
         self.width * self.rows
     }
 }
@@ -41,7 +41,7 @@ impl Bands {
 /// # Errors
 /// What `advance` returns; the remaining bands are skipped.
 #[inline(always)]
-pub fn run_bands<S: Simd, B: Send, R: Send>(
+pub(crate) fn run_bands<S: Simd, B: Send, R: Send>(
     simd: S,
     bands: Vec<B>,
     advance: Advance,

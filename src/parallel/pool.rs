@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use std::thread::JoinHandle;
 
 /// A rayon pool whose threads are joined when it is dropped; dropping rayon's own does not wait for them.
-pub struct JoinedPool {
+pub(crate) struct JoinedPool {
     /// `None` only while it is dropped.
     pool: Option<rayon::ThreadPool>,
     threads: Vec<JoinHandle<()>>,
@@ -15,7 +15,7 @@ impl JoinedPool {
     ///
     /// # Errors
     /// The system cannot start them.
-    pub fn new(threads: usize) -> Result<JoinedPool> {
+    pub(crate) fn new(threads: usize) -> Result<JoinedPool> {
         let mut handles = Vec::new();
         let spawn = |thread: rayon::ThreadBuilder| {
             let builder = std::thread::Builder::new().name(format!("skep {}", thread.index()));
@@ -35,7 +35,7 @@ impl JoinedPool {
     }
 
     /// Runs `work` on the pool and waits for it.
-    pub fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
+    pub(crate) fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
         self.pool.as_ref().expect("only dropping takes the pool").install(work)
     }
 }

@@ -15,7 +15,7 @@ use crate::view_selection::{SourceLists, source_lists};
 use rayon::prelude::*;
 
 /// What all stages of a run share.
-pub struct RunContext {
+pub(super) struct RunContext {
     pub options: Options,
     pub level: SimdLevel,
     /// By scale.
@@ -32,7 +32,7 @@ impl RunContext {
     ///
     /// # Errors
     /// An option out of its range, named; what `advance` returns.
-    pub fn new(scene: &Scene, options: &Options, advance: Advance) -> Result<RunContext> {
+    pub(super) fn new(scene: &Scene, options: &Options, advance: Advance) -> Result<RunContext> {
         options.check()?;
         let scales = &options.schedule.scales;
         let mut scaled = Vec::new();
@@ -54,43 +54,43 @@ impl RunContext {
     }
 
     /// The cycles in order.
-    pub fn cycles(&self) -> &[Cycle] {
+    pub(super) fn cycles(&self) -> &[Cycle] {
         &self.cycles
     }
 
     /// Number of views.
-    pub fn views(&self) -> usize {
+    pub(super) fn views(&self) -> usize {
         self.sources.lists.len()
     }
 
     /// The source views of a view, which its view sets index.
-    pub fn sources(&self, view: usize) -> &[u32] {
+    pub(super) fn sources(&self, view: usize) -> &[u32] {
         &self.sources.lists[view]
     }
 
     /// Warnings about the selection of source views, as sentences.
-    pub fn warnings(&self) -> &[String] {
+    pub(super) fn warnings(&self) -> &[String] {
         &self.sources.warnings
     }
 
     /// The window of the patches on the scale of a cycle.
-    pub fn window(&self, cycle: usize) -> &Window {
+    pub(super) fn window(&self, cycle: usize) -> &Window {
         &self.windows[self.cycles[cycle].scale_index]
     }
 
     /// A view on the scale of a cycle.
-    pub fn scaled(&self, at: Place) -> &ScaledView {
+    pub(super) fn scaled(&self, at: Place) -> &ScaledView {
         &self.scaled[self.cycles[at.cycle].scale_index][at.view]
     }
 
     /// The data of a view that the filters of its planes read.
-    pub fn filtered_view(&self, at: Place) -> FilteredView<'_> {
+    pub(super) fn filtered_view(&self, at: Place) -> FilteredView<'_> {
         let ScaledView { camera, image, range, .. } = self.scaled(at);
         FilteredView { camera, image, range: *range }
     }
 
     /// A view and its sources with their published surfaces.
-    pub fn problem<'b>(&'b self, at: Place, surfaces: PublishedSurfaces<'b>) -> Problem<'b> {
+    pub(super) fn problem<'b>(&'b self, at: Place, surfaces: PublishedSurfaces<'b>) -> Problem<'b> {
         let ScaledView { camera, image, range, .. } = self.scaled(at);
         let mut problem = Problem::new(camera, image, *range);
         for (&source, surface) in self.sources(at.view).iter().zip(surfaces.0) {
@@ -101,7 +101,7 @@ impl RunContext {
     }
 
     /// The views that have a view among their sources, with their checked planes where these are known.
-    pub fn donors<'b>(
+    pub(super) fn donors<'b>(
         &'b self,
         at: Place,
         planes: impl Fn(usize) -> Option<&'b [PixelEstimate]>,
@@ -116,7 +116,7 @@ impl RunContext {
 
     /// The cycle after this one, whose records these are; `None` after the last. From its second cycle on,
     /// a scale ends early once fewer pixels changed than the option `schedule.min_changed_fraction` asks for.
-    pub fn next_cycle<'e>(
+    pub(super) fn next_cycle<'e>(
         &self,
         cycle: usize,
         records: impl Iterator<Item = &'e CycleRecord>,
@@ -136,7 +136,7 @@ impl RunContext {
     }
 
     /// Whether the scale may end with a cycle, as far as the record of one view determines it.
-    pub fn may_end_scale(&self, cycle: usize, record: Option<&CycleRecord>) -> bool {
+    pub(super) fn may_end_scale(&self, cycle: usize, record: Option<&CycleRecord>) -> bool {
         let scale = |cycle: usize| self.cycles.get(cycle).map(|cycle| cycle.scale_index);
         let min_changed = self.options.schedule.min_changed_fraction;
         scale(cycle + 1) != scale(cycle)
@@ -144,20 +144,20 @@ impl RunContext {
     }
 
     /// Units of work of searching all views in the cycles before this one.
-    pub fn work_before(&self, cycle: usize) -> u64 {
+    pub(super) fn work_before(&self, cycle: usize) -> u64 {
         let pixels = |scale: usize| self.scaled[scale].iter().map(|view| view.camera.pixels() as u64).sum();
         self.cycles[..cycle].iter().map(|cycle| cycle.work(pixels(cycle.scale_index))).sum()
     }
 
     /// The progress of the run in a phase of a view.
-    pub fn progress(&self, phase: Phase, at: Place) -> Progress {
+    pub(super) fn progress(&self, phase: Phase, at: Place) -> Progress {
         let cycle = &self.cycles[at.cycle];
         let (downscale, views) = (cycle.scale.downscale, self.views());
         Progress { phase, downscale, cycle: cycle.cycle, view: at.view, views, done: 0.0 }
     }
 
     /// Returns an error for a cycle or view that does not exist.
-    pub fn check_place(&self, at: Place) -> Result<()> {
+    pub(super) fn check_place(&self, at: Place) -> Result<()> {
         if at.cycle >= self.cycles.len() {
             let expected = format!("a cycle below the number of cycles, {}", self.cycles.len());
             return Err(Error::argument("cycle", at.cycle, expected));

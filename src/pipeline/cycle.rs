@@ -38,7 +38,7 @@ impl Cycle {
 
 /// A view in a cycle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Place {
+pub(crate) struct Place {
     /// Index of the cycle in the run.
     pub cycle: usize,
     /// Index of the view in the scene.

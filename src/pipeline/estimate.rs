@@ -20,7 +20,7 @@ pub struct ViewEstimate<S> {
 
 /// Searched, textureless regions not filled yet.
 #[derive(Debug, Clone)]
-pub struct Unfilled {
+pub(super) struct Unfilled {
     pub(super) view_sets: ViewSets,
     pub(super) is_textureless: Vec<bool>,
 }
@@ -34,7 +34,7 @@ pub struct Searched {
 
 /// Checked, not filtered and published yet.
 #[derive(Debug, Clone)]
-pub struct Unpublished;
+pub(super) struct Unpublished;
 
 /// Checked in a cycle, filtered and published: has the verdicts, and the validated surface that other views
 /// read.

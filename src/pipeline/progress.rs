@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// The progress before the first cycle.
-pub fn start(scene: &Scene) -> Progress {
+pub(super) fn start(scene: &Scene) -> Progress {
     let views = scene.views().len();
     Progress { phase: Phase::Search, downscale: 1, cycle: 0, view: 0, views, done: 0.0 }
 }
@@ -16,7 +16,7 @@ pub fn start(scene: &Scene) -> Progress {
 const FUSION_SHARE: f64 = 0.03;
 
 /// Counts the work of a call and reports it to the host.
-pub struct Tracker<'a> {
+pub(super) struct Tracker<'a> {
     progress: ProgressFn<'a>,
     /// Units of work of the call before fusion.
     total: f64,
@@ -28,18 +28,18 @@ pub struct Tracker<'a> {
 
 impl<'a> Tracker<'a> {
     /// A tracker of a whole run, whose work is not known yet.
-    pub fn new(progress: ProgressFn<'a>) -> Tracker<'a> {
+    pub(super) fn new(progress: ProgressFn<'a>) -> Tracker<'a> {
         Tracker::with_work(progress, 0)
     }
 
     /// A tracker of a call with this number of units of work.
-    pub fn with_work(progress: ProgressFn<'a>, units: u64) -> Tracker<'a> {
+    pub(super) fn with_work(progress: ProgressFn<'a>, units: u64) -> Tracker<'a> {
         let (done, cancelled) = (AtomicU64::new(0), AtomicBool::new(false));
         Tracker { progress, total: units.max(1) as f64, share: 1.0, done, cancelled }
     }
 
     /// Sets the work of a whole run before fusion.
-    pub fn set_work(&mut self, units: u64) {
+    pub(super) fn set_work(&mut self, units: u64) {
         (self.total, self.share) = (units.max(1) as f64, 1.0 - FUSION_SHARE);
     }
 
@@ -47,18 +47,18 @@ impl<'a> Tracker<'a> {
     ///
     /// # Errors
     /// [`Error::Cancelled`] after the host has cancelled.
-    pub fn advance(&self, units: u64, at: Progress) -> Result<()> {
+    pub(super) fn advance(&self, units: u64, at: Progress) -> Result<()> {
         let done = self.done.fetch_add(units, Ordering::Relaxed) + units;
         self.report(&Progress { done: self.share * (done as f64 / self.total).min(1.0), ..at })
     }
 
     /// Sets the finished work after cycles were skipped.
-    pub fn jump_to(&self, units: u64) {
+    pub(super) fn jump_to(&self, units: u64) {
         self.done.store(units, Ordering::Relaxed);
     }
 
     /// Reports the fusion at the end of a whole run; `at` is the progress of the fusion alone.
-    pub fn report_fusion(&self, at: &Progress) -> ControlFlow<()> {
+    pub(super) fn report_fusion(&self, at: &Progress) -> ControlFlow<()> {
         (self.progress)(&Progress { done: 1.0 - FUSION_SHARE * (1.0 - at.done), ..*at })
     }
 

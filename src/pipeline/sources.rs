@@ -5,18 +5,18 @@ use std::marker::PhantomData;
 
 /// The surfaces that the sources of a view published after a check, in the order of its source list; empty
 /// where nothing is known.
-pub struct PublishedSurfaces<'a>(pub Vec<&'a [CompactPlane]>);
+pub(super) struct PublishedSurfaces<'a>(pub Vec<&'a [CompactPlane]>);
 
 /// The planes of the sources of a view after the stage `S`, in the order of its source list; empty where
 /// nothing is known.
-pub struct SourcePlanes<'a, S> {
+pub(super) struct SourcePlanes<'a, S> {
     planes: Vec<&'a [PixelEstimate]>,
     stage: PhantomData<S>,
 }
 
 impl<'a, S> SourcePlanes<'a, S> {
     /// The planes of these sources.
-    pub fn new(
+    pub(super) fn new(
         sources: &[u32],
         planes: impl Fn(usize) -> Option<&'a [PixelEstimate]>,
     ) -> SourcePlanes<'a, S> {
@@ -25,21 +25,24 @@ impl<'a, S> SourcePlanes<'a, S> {
     }
 
     /// By source.
-    pub fn into_vec(self) -> Vec<&'a [PixelEstimate]> {
+    pub(super) fn into_vec(self) -> Vec<&'a [PixelEstimate]> {
         self.planes
     }
 }
 
 impl<'a> PublishedSurfaces<'a> {
     /// The surfaces of these sources.
-    pub fn new(sources: &[u32], surface: impl Fn(usize) -> &'a [CompactPlane]) -> PublishedSurfaces<'a> {
+    pub(super) fn new(
+        sources: &[u32],
+        surface: impl Fn(usize) -> &'a [CompactPlane],
+    ) -> PublishedSurfaces<'a> {
         PublishedSurfaces(sources.iter().map(|&source| surface(source as usize)).collect())
     }
 }
 
 impl PublishedSurfaces<'_> {
     /// None of these sources has one.
-    pub fn none(sources: &[u32]) -> Self {
+    pub(super) fn none(sources: &[u32]) -> Self {
         PublishedSurfaces(vec![&[]; sources.len()])
     }
 }

@@ -50,7 +50,7 @@ impl Candidates {
 
 /// Upsamples an estimate to the scale of a cycle: each pixel gets the plane of its coarse pixel. An estimate
 /// that is already on that scale is unchanged.
-pub fn upsample(
+pub(super) fn upsample(
     context: &RunContext,
     at: Place,
     own: Option<ViewEstimate<Checked>>,
@@ -62,7 +62,11 @@ pub fn upsample(
 }
 
 /// An estimate of the next coarser scale on the scale of a cycle.
-pub fn upsampled(context: &RunContext, at: Place, own: &ViewEstimate<Checked>) -> ViewEstimate<Checked> {
+pub(super) fn upsampled(
+    context: &RunContext,
+    at: Place,
+    own: &ViewEstimate<Checked>,
+) -> ViewEstimate<Checked> {
     let (coarse, fine) = (context.scaled(own.at), context.scaled(at));
     let map = own.map.upsample(&coarse.camera, &fine.camera, fine.range);
     let surface = map.publish(&fine.camera);
@@ -71,7 +75,7 @@ pub fn upsampled(context: &RunContext, at: Place, own: &ViewEstimate<Checked>) -
 
 /// The candidates for the pixels of a view without a validated plane: of the planes of the views that have it
 /// among their sources, those that at least one source view confirms (section 5.6.1 of the paper).
-pub fn propagate(
+pub(super) fn propagate(
     context: &RunContext,
     at: Place,
     own: Option<&ViewEstimate<Checked>>,
@@ -93,7 +97,7 @@ pub fn propagate(
 
 /// The input of a search besides the published surfaces of the sources.
 #[derive(Clone, Copy)]
-pub struct SearchInput<'a> {
+pub(super) struct SearchInput<'a> {
     /// The view's own estimate of the cycle before, on this scale; `None` starts at random.
     pub own: Option<&'a ViewEstimate<Checked>>,
     /// The planes of other views.
@@ -103,7 +107,7 @@ pub struct SearchInput<'a> {
 }
 
 /// Searches the plane of every pixel (section 5 of the paper).
-pub fn search(
+pub(super) fn search(
     context: &RunContext,
     at: Place,
     problem: &Problem,
@@ -145,7 +149,7 @@ pub fn search(
 
 /// Fills textureless regions from the planes around them; determines the view sets of the filled pixels.
 /// Reads the images and the published surfaces of the sources.
-pub fn fill_textureless(
+pub(super) fn fill_textureless(
     context: &RunContext,
     problem: &Problem,
     found: ViewEstimate<Unfilled>,
@@ -170,7 +174,7 @@ pub fn fill_textureless(
 const CHANGED_DEPTH: f32 = 1e-3;
 
 /// Records the cycle: how many pixels have a plane, and how many planes changed since the cycle before.
-pub fn record_search(
+pub(super) fn record_search(
     context: &RunContext,
     own: Option<&ViewEstimate<Checked>>,
     mut searched: ViewEstimate<Searched>,
@@ -193,7 +197,7 @@ pub fn record_search(
 }
 
 /// Checks the planes of a view against the searched planes of its sources (section 5.6 of the paper).
-pub fn check(
+pub(super) fn check(
     context: &RunContext,
     own: &ViewEstimate<Searched>,
     sources: SourcePlanes<Searched>,
@@ -212,7 +216,7 @@ pub fn check(
 }
 
 /// Writes the verdicts of a check into the checked planes.
-pub fn apply_check(own: ViewEstimate<Searched>, verdicts: &[Verdict]) -> ViewEstimate<Unpublished> {
+pub(super) fn apply_check(own: ViewEstimate<Searched>, verdicts: &[Verdict]) -> ViewEstimate<Unpublished> {
     let (mut checked, _) = own.into_stage(Unpublished);
     checked.map.set_verdicts(verdicts);
     checked
@@ -220,7 +224,7 @@ pub fn apply_check(own: ViewEstimate<Searched>, verdicts: &[Verdict]) -> ViewEst
 
 /// Corrects foreground fattening where the scale may end, as far as the view knows: changes depths and
 /// normals of validated pixels at edges; in the last cycle some lose their validation.
-pub fn correct_fattening(context: &RunContext, own: &mut ViewEstimate<Unpublished>) {
+pub(super) fn correct_fattening(context: &RunContext, own: &mut ViewEstimate<Unpublished>) {
     if context.may_end_scale(own.cycle(), own.cycles().last()) {
         let filter = CorrectFattening {
             passes: context.options.refine.fattening_passes,
@@ -231,13 +235,13 @@ pub fn correct_fattening(context: &RunContext, own: &mut ViewEstimate<Unpublishe
 }
 
 /// Smooths validated planes: changes their depths and normals.
-pub fn smooth_planes(context: &RunContext, own: &mut ViewEstimate<Unpublished>) {
+pub(super) fn smooth_planes(context: &RunContext, own: &mut ViewEstimate<Unpublished>) {
     let filter = SmoothPlanes { passes: context.options.refine.smoothing_passes };
     filter.apply(&context.filtered_view(own.at), &mut own.map.planes);
 }
 
 /// Publishes the validated planes to other views, and records their number.
-pub fn publish(context: &RunContext, own: ViewEstimate<Unpublished>) -> ViewEstimate<Checked> {
+pub(super) fn publish(context: &RunContext, own: ViewEstimate<Unpublished>) -> ViewEstimate<Checked> {
     let surface = own.map.publish(&context.scaled(own.at).camera);
     let (mut checked, Unpublished) = own.into_stage(Checked { surface });
     let validated = checked.map.count_validated();
@@ -248,7 +252,7 @@ pub fn publish(context: &RunContext, own: ViewEstimate<Unpublished>) -> ViewEsti
 }
 
 /// The planes of a view, the validated ones averaged with the published surfaces of its sources.
-pub fn average_across_views(
+pub(super) fn average_across_views(
     context: &RunContext,
     problem: &Problem,
     own: &ViewEstimate<Checked>,
@@ -260,17 +264,17 @@ pub fn average_across_views(
 }
 
 /// Planes for pixels of small gaps.
-pub struct FilledGaps(Vec<(u32, PixelEstimate)>);
+pub(super) struct FilledGaps(Vec<(u32, PixelEstimate)>);
 
 impl FilledGaps {
     /// Writes them to the planes of their view.
-    pub fn write_to(&self, planes: &mut [PixelEstimate]) {
+    pub(super) fn write_to(&self, planes: &mut [PixelEstimate]) {
         self.0.iter().for_each(|&(pixel, plane)| planes[pixel as usize] = plane);
     }
 }
 
 /// Planes, not validated yet, for the pixels of small gaps from the planes around them.
-pub fn fill_gaps(context: &RunContext, at: Place, averaged: &[PixelEstimate]) -> FilledGaps {
+pub(super) fn fill_gaps(context: &RunContext, at: Place, averaged: &[PixelEstimate]) -> FilledGaps {
     if !context.options.refine.fill_gaps {
         return FilledGaps(Vec::new());
     }
@@ -281,7 +285,7 @@ pub fn fill_gaps(context: &RunContext, at: Place, averaged: &[PixelEstimate]) ->
 
 /// The filled planes that are consistent with the planes of the sources before averaging, within tighter
 /// tolerances than those of the check.
-pub fn recheck(
+pub(super) fn recheck(
     context: &RunContext,
     problem: &Problem,
     filled: FilledGaps,
@@ -317,7 +321,7 @@ pub fn recheck(
 
 /// Determines view set, cost (mean of 1 - NCC) and status of every pixel. Reads images and published surfaces
 /// of the sources.
-pub fn classify(
+pub(super) fn classify(
     context: &RunContext,
     problem: &Problem,
     own: ViewEstimate<Checked>,
@@ -352,7 +356,7 @@ pub fn classify(
 
 /// Fuses the validated pixels of all views into points (section 6 of the paper). Reads the results of the
 /// views that share a sparse point with a view.
-pub fn fuse(
+pub(super) fn fuse(
     scene: &Scene,
     options: &Options,
     results: &[ViewResult],

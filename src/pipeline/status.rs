@@ -9,7 +9,7 @@ const AT_RANGE_END: f32 = 1e-3;
 
 /// The status of each pixel of a view; a plane that is not validated and visible in fewer than
 /// `min_views` source views has no sources.
-pub fn classify(
+pub(super) fn classify(
     view: &ScaledView,
     planes: &[PixelEstimate],
     confidence: &Confidence,

@@ -8,17 +8,17 @@ use crate::scene::{CompactPlane, PixelEstimate};
 use rayon::prelude::*;
 
 /// One value for each view.
-pub struct Store<T>(Vec<T>);
+pub(super) struct Store<T>(Vec<T>);
 
 /// The published surfaces of all views.
-pub struct SurfaceStore(Vec<Vec<CompactPlane>>);
+pub(super) struct SurfaceStore(Vec<Vec<CompactPlane>>);
 
 /// Threads that one view keeps busy.
 const THREADS_PER_VIEW: usize = 4;
 
 impl SurfaceStore {
     /// The surfaces of a view's sources.
-    pub fn of_sources(&self, sources: &[u32]) -> PublishedSurfaces<'_> {
+    pub(super) fn of_sources(&self, sources: &[u32]) -> PublishedSurfaces<'_> {
         PublishedSurfaces::new(sources, |source| &self.0[source])
     }
 }
@@ -26,7 +26,7 @@ impl SurfaceStore {
 impl<T: Send> Store<T> {
     /// Runs a stage for all views, a few at a time: the threads share the work of a view, and those without
     /// work in it take that of another one. The limit on concurrent views bounds the memory.
-    pub fn map<R: Send>(self, stage: impl Fn(usize, T) -> Result<R> + Sync) -> Result<Store<R>> {
+    pub(super) fn map<R: Send>(self, stage: impl Fn(usize, T) -> Result<R> + Sync) -> Result<Store<R>> {
         let at_a_time = 1 + (rayon::current_num_threads() + THREADS_PER_VIEW / 2) / THREADS_PER_VIEW;
         let mut turns: Vec<Vec<(usize, T)>> = (0..at_a_time).map(|_| Vec::new()).collect();
         for (view, input) in self.0.into_iter().enumerate() {
@@ -42,7 +42,7 @@ impl<T: Send> Store<T> {
     }
 
     /// Like `map`, but keeps the values of all views.
-    pub fn map_ref<R: Send>(&self, stage: impl Fn(usize, &T) -> Result<R> + Sync) -> Result<Store<R>>
+    pub(super) fn map_ref<R: Send>(&self, stage: impl Fn(usize, &T) -> Result<R> + Sync) -> Result<Store<R>>
     where
         T: Sync,
     {
@@ -50,39 +50,39 @@ impl<T: Send> Store<T> {
     }
 
     /// Both values of each view.
-    pub fn zip<U: Send>(self, other: Store<U>) -> Store<(T, U)> {
+    pub(super) fn zip<U: Send>(self, other: Store<U>) -> Store<(T, U)> {
         Store(self.0.into_iter().zip(other.0).collect())
     }
 
     /// By view.
-    pub fn into_vec(self) -> Vec<T> {
+    pub(super) fn into_vec(self) -> Vec<T> {
         self.0
     }
 }
 
 impl Store<Option<ViewEstimate<Checked>>> {
     /// No estimates, as before the first cycle.
-    pub fn unknown(views: usize) -> Self {
+    pub(super) fn unknown(views: usize) -> Self {
         Store((0..views).map(|_| None).collect())
     }
 
     /// The record of the last cycle of every view.
-    pub fn last_records(&self) -> impl Iterator<Item = &CycleRecord> {
+    pub(super) fn last_records(&self) -> impl Iterator<Item = &CycleRecord> {
         self.0.iter().flatten().filter_map(|own| own.cycles().last())
     }
 
     /// The estimates of all views, which exist after the first cycle.
-    pub fn all_known(self) -> Store<ViewEstimate<Checked>> {
+    pub(super) fn all_known(self) -> Store<ViewEstimate<Checked>> {
         Store(self.0.into_iter().flatten().collect())
     }
 
     /// The checked planes of a view.
-    pub fn planes(&self, view: usize) -> Option<&[PixelEstimate]> {
+    pub(super) fn planes(&self, view: usize) -> Option<&[PixelEstimate]> {
         self.0[view].as_ref().map(ViewEstimate::planes)
     }
 
     /// Takes the published surfaces out of the estimates.
-    pub fn take_surfaces(mut self) -> (Self, SurfaceStore) {
+    pub(super) fn take_surfaces(mut self) -> (Self, SurfaceStore) {
         let take = |own: &mut Option<ViewEstimate<Checked>>| own.as_mut().map(ViewEstimate::take_surface);
         let surfaces = self.0.iter_mut().map(|own| take(own).unwrap_or_default()).collect();
         (self, SurfaceStore(surfaces))
@@ -91,19 +91,19 @@ impl Store<Option<ViewEstimate<Checked>>> {
 
 impl<S> Store<ViewEstimate<S>> {
     /// The planes of a view's sources.
-    pub fn planes_of_sources(&self, sources: &[u32]) -> SourcePlanes<'_, S> {
+    pub(super) fn planes_of_sources(&self, sources: &[u32]) -> SourcePlanes<'_, S> {
         SourcePlanes::new(sources, |source| Some(self.0[source].planes()))
     }
 }
 
 impl Store<ViewEstimate<Checked>> {
     /// The published surfaces of a view's sources.
-    pub fn surfaces_of_sources(&self, sources: &[u32]) -> PublishedSurfaces<'_> {
+    pub(super) fn surfaces_of_sources(&self, sources: &[u32]) -> PublishedSurfaces<'_> {
         PublishedSurfaces::new(sources, |source| self.0[source].surface())
     }
 
     /// Takes the published surfaces out of the estimates.
-    pub fn take_surfaces(mut self) -> (Self, SurfaceStore) {
+    pub(super) fn take_surfaces(mut self) -> (Self, SurfaceStore) {
         let surfaces = self.0.iter_mut().map(ViewEstimate::take_surface).collect();
         (self, SurfaceStore(surfaces))
     }

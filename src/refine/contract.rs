@@ -11,7 +11,7 @@ use crate::testing::{self, RANGE};
 use glam::Vec3;
 
 /// Makes a filter for a view without source views and with these textureless pixels.
-pub type MakeFilter = for<'a> fn(&'a Problem<'a>, &'a [bool]) -> Box<dyn Filter + 'a>;
+pub(super) type MakeFilter = for<'a> fn(&'a Problem<'a>, &'a [bool]) -> Box<dyn Filter + 'a>;
 
 /// Large enough for an estimate of the image's noise.
 const SIZE: Grid = Grid { width: 72, height: 64 };
@@ -23,7 +23,7 @@ const CROPS: [Rectangle; 3] = [
 ];
 
 /// Asserts that a filter keeps what the documentation of [`Filter`] promises.
-pub fn assert_contract(make: MakeFilter) {
+pub(super) fn assert_contract(make: MakeFilter) {
     let mut changed = 0;
     // Depths of the scene are 3.4 to 7: the second range cuts them.
     for range in [RANGE, DepthRange { near: 3.9, far: 5.3 }] {

@@ -45,7 +45,7 @@ const PROBES: [Offset; 12] =
     [(3, 0), (-3, 0), (0, 3), (0, -3), (6, 0), (-6, 0), (0, 6), (0, -6), (4, 4), (-4, 4), (4, -4), (-4, -4)];
 
 /// Moves validated pixels at depth edges to the surface behind if their gray values are closer to its.
-pub struct CorrectFattening {
+pub(crate) struct CorrectFattening {
     /// How many times the edges are moved, each time by a few pixels at most.
     pub passes: u32,
     /// Whether no search follows: then pixels without a plane count as background, and validated pixels among

@@ -34,7 +34,7 @@ const MIN_NEIGHBORS: usize = 3;
 
 /// Replaces planes that are not validated by the plane of the surrounding surface, as yet unchecked: cost 0,
 /// 0 consistent source views, not validated. Pixels without such a surface keep theirs.
-pub struct FillGaps;
+pub(crate) struct FillGaps;
 
 impl Filter for FillGaps {
     fn reach(&self) -> Option<usize> {

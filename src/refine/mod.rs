@@ -14,11 +14,11 @@
 //! [`SmoothPlanes`]: plane_smoothing::SmoothPlanes
 //! [`FillGaps`]: gap_filling::FillGaps
 
-pub mod foreground_fattening;
-pub mod gap_filling;
-pub mod plane_smoothing;
-pub mod stencil;
-pub mod textureless;
+pub(crate) mod foreground_fattening;
+pub(crate) mod gap_filling;
+pub(crate) mod plane_smoothing;
+pub(crate) mod stencil;
+pub(crate) mod textureless;
 
 #[cfg(test)]
 mod contract;
@@ -30,7 +30,7 @@ use glam::{DVec2, Vec3};
 
 /// The view whose planes are filtered.
 #[derive(Clone, Copy)]
-pub struct FilteredView<'a> {
+pub(crate) struct FilteredView<'a> {
     /// Its camera on the scale of the planes.
     pub camera: &'a Camera,
     /// Its gray image, of the camera's size.
@@ -58,7 +58,7 @@ impl FilteredView<'_> {
 
 /// The pixels whose planes a filter may replace.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Domain {
+pub(crate) enum Domain {
     /// Pixels with a validated plane.
     Validated,
     /// Pixels with a plane that is not validated.
@@ -69,7 +69,7 @@ pub enum Domain {
 
 impl Domain {
     /// Whether it includes a pixel with this estimate.
-    pub fn includes(self, estimate: &PixelEstimate) -> bool {
+    pub(crate) fn includes(self, estimate: &PixelEstimate) -> bool {
         let has_plane = estimate.depth > 0.0;
         match self {
             Domain::Validated => has_plane && estimate.validated,
@@ -88,7 +88,7 @@ impl Domain {
 /// - a plane that the surrounding planes agree with stays the same up to rounding (relative 1e-5);
 /// - the result is the same, to the bit, for every number of threads;
 /// - a new estimate depends on nothing farther away than the reach.
-pub trait Filter: Sync {
+pub(crate) trait Filter: Sync {
     /// Largest distance in pixels, along x or y, of a plane or gray value that the new estimate of a pixel
     /// depends on; `None` where it depends on a region of any size.
     #[cfg_attr(

@@ -45,7 +45,7 @@ const SPATIAL_SIGMA: f32 = 2.7;
 
 /// Replaces each validated plane by the bilateral mean of the validated planes around it; planes whose mean
 /// is not usable stay.
-pub struct SmoothPlanes {
+pub(crate) struct SmoothPlanes {
     /// How many times the planes are smoothed, each time reading the result of the pass before.
     pub passes: u32,
 }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 /// A map with a border of one value on all sides, so that loops over whole rows need no bounds checks. On the
 /// right the border fills the last [`LANES`] columns that the map begins.
-pub struct PaddedMap {
+pub(crate) struct PaddedMap {
     border: usize,
     stride: usize,
     values: Vec<f32>,
@@ -16,7 +16,7 @@ pub struct PaddedMap {
 
 /// The border of a [`PaddedMap`].
 #[derive(Debug, Clone, Copy)]
-pub struct Border {
+pub(crate) struct Border {
     /// Its width in pixels.
     pub width: usize,
     /// The value of its pixels.
@@ -25,7 +25,7 @@ pub struct Border {
 
 impl PaddedMap {
     /// The map with these values by pixel index.
-    pub fn new(grid: Grid, border: Border, value: impl Fn(usize) -> f32 + Sync) -> PaddedMap {
+    pub(crate) fn new(grid: Grid, border: Border, value: impl Fn(usize) -> f32 + Sync) -> PaddedMap {
         let stride = grid.width.next_multiple_of(LANES) + 2 * border.width;
         let mut values = vec![border.value; stride * (grid.height + 2 * border.width)];
         let rows = values[border.width * stride..].par_chunks_exact_mut(stride).take(grid.height);
@@ -39,14 +39,14 @@ impl PaddedMap {
 
     /// `width` values of row `y + dy` from column `dx` on; offsets are limited to the width of the border.
     #[inline(always)]
-    pub fn row(&self, y: usize, offset: Offset, width: usize) -> &[f32] {
+    pub(crate) fn row(&self, y: usize, offset: Offset, width: usize) -> &[f32] {
         &self.values[self.index((0, y), offset)..][..width]
     }
 
     /// The values of `LANES` pixels from `x + dx` on in row `y + dy`; `x` is a multiple of `LANES` inside the
     /// map, offsets are limited to the width of the border.
     #[inline(always)]
-    pub fn lanes(&self, at: Position, offset: Offset) -> &[f32; LANES] {
+    pub(crate) fn lanes(&self, at: Position, offset: Offset) -> &[f32; LANES] {
         let index = self.index(at, offset);
         self.values[index..].first_chunk().expect("the border fills the last lanes")
     }
@@ -64,12 +64,12 @@ fn gaussian(value: f32, sigma: f32) -> f32 {
 }
 
 /// The offsets of a neighborhood without its center, row by row, with their weights.
-pub struct Stencil(Vec<(Offset, f32)>);
+pub(crate) struct Stencil(Vec<(Offset, f32)>);
 
 impl Stencil {
     /// The disc with `dx^2 + dy^2 <= radius^2 + 1`, weighted by a Gaussian of the distance; both lengths in
     /// pixels.
-    pub fn disc(radius: i32, sigma: f32) -> Stencil {
+    pub(crate) fn disc(radius: i32, sigma: f32) -> Stencil {
         let offsets = (-radius..=radius).flat_map(|dy| (-radius..=radius).map(move |dx| (dx, dy)));
         let is_inside = |&(dx, dy): &Offset| dx * dx + dy * dy <= radius * radius + 1 && (dx, dy) != (0, 0);
         let weigh = |(dx, dy): Offset| ((dx, dy), gaussian(((dx * dx + dy * dy) as f32).sqrt(), sigma));
@@ -78,18 +78,18 @@ impl Stencil {
 }
 
 /// Weights of differences of gray values.
-pub struct GrayWeights([f32; 256]);
+pub(crate) struct GrayWeights([f32; 256]);
 
 impl GrayWeights {
     /// A Gaussian of the difference in gray values of 0 to 255, but `min_weight` at least.
-    pub fn new(sigma: f32, min_weight: f32) -> GrayWeights {
+    pub(crate) fn new(sigma: f32, min_weight: f32) -> GrayWeights {
         GrayWeights(std::array::from_fn(|difference| gaussian(difference as f32, sigma).max(min_weight)))
     }
 }
 
 /// The neighborhood of a bilateral filter (Tomasi and Manduchi, 1998): neighbors are weighted by their
 /// distance and by the difference of their gray value.
-pub struct BilateralStencil {
+pub(crate) struct BilateralStencil {
     /// Weights by distance.
     pub spatial: Stencil,
     /// Weights by difference of gray values.
@@ -97,7 +97,7 @@ pub struct BilateralStencil {
 }
 
 /// A pixel of a neighborhood.
-pub struct Neighbor {
+pub(crate) struct Neighbor {
     /// Its index.
     pub pixel: usize,
     /// Its offset from the center.
@@ -109,7 +109,7 @@ pub struct Neighbor {
 impl BilateralStencil {
     /// The neighbors of a pixel inside the image, row by row.
     #[inline(always)]
-    pub fn neighbors(&self, image: &PackedImage, center: Position) -> impl Iterator<Item = Neighbor> {
+    pub(crate) fn neighbors(&self, image: &PackedImage, center: Position) -> impl Iterator<Item = Neighbor> {
         let grid = Grid { width: image.width, height: image.height };
         let gray = image.gray(center.0, center.1);
         self.spatial.0.iter().filter_map(move |&(offset, weight)| {

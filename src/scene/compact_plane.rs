@@ -6,7 +6,7 @@ use crate::geometry::SlantedPlane;
 /// cache. Slopes are rounded to the upper 16 bits of an f32, a relative error of at most 2^-9: half a pixel
 /// away that is less than a millionth of most depths.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct CompactPlane {
+pub(crate) struct CompactPlane {
     /// 0 where nothing is validated.
     inverse_depth: f32,
     /// Along x in the upper half, along y in the lower one.
@@ -16,13 +16,13 @@ pub struct CompactPlane {
 impl CompactPlane {
     /// Inverse depth at the pixel, 0 where nothing is validated.
     #[inline(always)]
-    pub fn inverse_depth(&self) -> f32 {
+    pub(crate) fn inverse_depth(&self) -> f32 {
         self.inverse_depth
     }
 
     /// Its change per pixel along x and y.
     #[inline(always)]
-    pub fn slopes(&self) -> (f32, f32) {
+    pub(crate) fn slopes(&self) -> (f32, f32) {
         (f32::from_bits(self.slopes & 0xffff_0000), f32::from_bits(self.slopes << 16))
     }
 }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 /// The estimate of a pixel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct PixelEstimate {
+pub(crate) struct PixelEstimate {
     /// Depth at the pixel, 0 where there is none.
     pub depth: f32,
     /// Unit normal in the camera frame, facing the camera.
@@ -39,36 +39,36 @@ impl From<RankingCost> for f32 {
 }
 
 /// The number of source views consistent with a plane, at most 255, and whether they validate it.
-pub type Verdict = (u8, bool);
+pub(crate) type Verdict = (u8, bool);
 
 /// The planes of all pixels of a view, row by row.
 #[derive(Debug, Clone, Default)]
-pub struct PlaneMap {
+pub(crate) struct PlaneMap {
     /// One for each pixel.
     pub planes: Vec<PixelEstimate>,
 }
 
 impl PlaneMap {
     /// Writes the verdicts of a check, one for each pixel.
-    pub fn set_verdicts(&mut self, verdicts: &[Verdict]) {
+    pub(crate) fn set_verdicts(&mut self, verdicts: &[Verdict]) {
         self.planes.par_iter_mut().zip(verdicts).for_each(|(plane, &(consistent_views, validated))| {
             (plane.consistent_views, plane.validated) = (consistent_views, validated);
         });
     }
 
     /// Number of validated planes.
-    pub fn count_validated(&self) -> u64 {
+    pub(crate) fn count_validated(&self) -> u64 {
         self.planes.iter().filter(|plane| plane.validated).count() as u64
     }
 
     /// The validated planes as other views read them, with inverse depth 0 elsewhere.
-    pub fn publish(&self, camera: &Camera) -> Vec<CompactPlane> {
+    pub(crate) fn publish(&self, camera: &Camera) -> Vec<CompactPlane> {
         slanted(camera, &self.planes).map(CompactPlane::from).collect()
     }
 
     /// The map on the next finer scale: each fine pixel takes the plane, cost and verdict of its coarse
     /// pixel. A plane that leaves the depth range at the fine pixel keeps the depth of the coarse one.
-    pub fn upsample(&self, coarse: &Camera, fine: &Camera, range: DepthRange) -> PlaneMap {
+    pub(crate) fn upsample(&self, coarse: &Camera, fine: &Camera, range: DepthRange) -> PlaneMap {
         let (grid, coarse_grid) = (fine.grid(), coarse.grid());
         let refine = |index: usize| {
             let (x, y) = grid.position(index);
@@ -102,7 +102,7 @@ fn turned_to(normal: DVec3, ray: DVec3) -> DVec3 {
 }
 
 /// The validated planes as inverse depth about their pixels, with inverse depth 0 elsewhere.
-pub fn validated_planes(camera: &Camera, planes: &[PixelEstimate]) -> Vec<SlantedPlane> {
+pub(crate) fn validated_planes(camera: &Camera, planes: &[PixelEstimate]) -> Vec<SlantedPlane> {
     slanted(camera, planes).collect()
 }
 

@@ -7,7 +7,7 @@ use crate::scene::{Scene, View};
 
 /// A view reduced to one scale.
 #[derive(Debug, Clone)]
-pub struct ScaledView {
+pub(crate) struct ScaledView {
     /// Its camera on this scale.
     pub camera: Camera,
     /// Its gray image in the layout the kernels sample.
@@ -20,7 +20,7 @@ pub struct ScaledView {
 
 impl ScaledView {
     /// The view of a scene with this index, its image reduced by this power of two.
-    pub fn of(scene: &Scene, index: usize, downscale: u32) -> ScaledView {
+    pub(crate) fn of(scene: &Scene, index: usize, downscale: u32) -> ScaledView {
         ScaledView::new(&scene.views()[index], scene.depth_range(index), downscale)
     }
 

@@ -6,11 +6,11 @@ use wide::{f32x8, i32x8};
 
 /// The token of the baseline back-end: SSE2 on x86-64, NEON on AArch64, simd128 on wasm.
 #[derive(Debug, Clone, Copy)]
-pub struct Baseline;
+pub(crate) struct Baseline;
 
 /// Eight positions in an image, clamped and truncated, in units of 1/256 px.
 #[derive(Debug, Clone, Copy)]
-pub struct SamplePositions<'a> {
+pub(crate) struct SamplePositions<'a> {
     image: &'a Taps,
     x: f32x8,
     y: f32x8,

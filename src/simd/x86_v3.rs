@@ -7,12 +7,12 @@ use core::arch::x86_64::*;
 
 /// The token of the AVX2 back-end. Owning one proves that the CPU has AVX2, BMI1, BMI2 and POPCNT.
 #[derive(Debug, Clone, Copy)]
-pub struct X86V3(());
+pub(crate) struct X86V3(());
 
 /// Eight positions in an image, clamped and truncated, in units of 1/256 px, and the indices of their top
 /// left pairs.
 #[derive(Debug, Clone, Copy)]
-pub struct SamplePositions<'a> {
+pub(crate) struct SamplePositions<'a> {
     image: &'a Taps,
     x: __m256i,
     y: __m256i,
@@ -22,7 +22,7 @@ pub struct SamplePositions<'a> {
 
 impl X86V3 {
     /// The token, or `None` where the CPU lacks one of the four features.
-    pub fn new() -> Option<X86V3> {
+    pub(crate) fn new() -> Option<X86V3> {
         let has_all = is_x86_feature_detected!("avx2")
             && is_x86_feature_detected!("bmi1")
             && is_x86_feature_detected!("bmi2")

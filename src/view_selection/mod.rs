@@ -7,4 +7,4 @@ mod source_lists;
 mod tests;
 
 pub(crate) use rules::{ViewRules, ViewSelector, select_sets};
-pub use source_lists::{SourceLists, source_lists, triangulation_angle};
+pub(crate) use source_lists::{SourceLists, source_lists, triangulation_angle};

@@ -54,7 +54,7 @@ fn dot<S: Simd>(simd: S, a: &Vectors<S>, b: &Vectors<S>) -> S::F32 {
 
 /// The thresholds of pixelwise view selection.
 #[derive(Debug, Clone, Copy)]
-pub struct ViewRules {
+pub(crate) struct ViewRules {
     /// Cosine of the largest incident angle.
     min_cosine: f32,
     /// Relative difference in depth up to which nothing is occluded.
@@ -68,7 +68,7 @@ impl ViewRules {
     /// The thresholds of these options. A wrong solution may be occluded in every source view: with
     /// `min_views` above 0 its pixel gets all source views again. The paper has no such rule: its cost is
     /// then infinite.
-    pub fn new(options: &Options, min_views: usize) -> ViewRules {
+    pub(crate) fn new(options: &Options, min_views: usize) -> ViewRules {
         ViewRules {
             min_cosine: options.view_selection.max_incident_angle.to_radians().cos() as f32,
             occlusion_tolerance: options.view_selection.occlusion_tolerance as f32,
@@ -81,7 +81,7 @@ impl ViewRules {
 /// Selects the view sets of the pixels of a reference view, one pixel at a time and eight source views at a
 /// time.
 #[derive(Debug, Clone)]
-pub struct ViewSelector<'a, S: Simd> {
+pub(crate) struct ViewSelector<'a, S: Simd> {
     simd: S,
     problem: &'a Problem<'a>,
     rules: ViewRules,
@@ -93,7 +93,7 @@ pub struct ViewSelector<'a, S: Simd> {
 
 impl<'a, S: Simd> ViewSelector<'a, S> {
     /// A selector for the pixels of a reference view.
-    pub fn new(simd: S, problem: &'a Problem<'a>, rules: ViewRules) -> ViewSelector<'a, S> {
+    pub(crate) fn new(simd: S, problem: &'a Problem<'a>, rules: ViewRules) -> ViewSelector<'a, S> {
         let lanes = |sources: &[Source], axis: usize| -> Lanes {
             std::array::from_fn(|lane| sources.get(lane).map_or(0.0, |source| source.center[axis]))
         };
@@ -111,7 +111,7 @@ impl<'a, S: Simd> ViewSelector<'a, S> {
     /// Sets `set` to the source views that see the solution of a pixel: inside the image and, with pixelwise
     /// view selection, neither at grazing incidence nor occluded.
     #[inline(always)]
-    pub fn select(&mut self, set: &mut [u32], (x, y): (f32, f32), depth: f32, normal: Vec3) {
+    pub(crate) fn select(&mut self, set: &mut [u32], (x, y): (f32, f32), depth: f32, normal: Vec3) {
         let ViewSelector { simd, problem, rules, projector, centers } = self;
         set.fill(0);
         projector.set_pixel(x, y);
@@ -137,7 +137,7 @@ impl<'a, S: Simd> ViewSelector<'a, S> {
 }
 
 /// Replaces the view sets of some pixels, each given as index, depth and normal of its solution.
-pub fn select_sets(
+pub(crate) fn select_sets(
     problem: &Problem,
     rules: ViewRules,
     sets: &mut ViewSets,

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 
 /// The source lists of all views.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct SourceLists {
+pub(crate) struct SourceLists {
     /// For each view the indices of its source views: those with a triangulation angle in the range, smallest
     /// angle first; where there are none, those with the angles nearest to the range.
     pub lists: Vec<Vec<u32>>,
@@ -32,7 +32,7 @@ const GRID_FRACTIONS: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 /// The source list of every view: the one given with the scene, or else all views that overlap with it at a
 /// triangulation angle in the range of the options; where there are none, those with the angles nearest to
 /// the range.
-pub fn source_lists(scene: &Scene, options: &Options) -> SourceLists {
+pub(crate) fn source_lists(scene: &Scene, options: &Options) -> SourceLists {
     let shared = shared_angles(scene);
     let mut lists = SourceLists::default();
     for (index, view) in scene.views().iter().enumerate() {
@@ -67,7 +67,7 @@ pub fn source_lists(scene: &Scene, options: &Options) -> SourceLists {
 /// The triangulation angle of two views in degrees, as [`source_lists`] uses it: the 75th percentile of the
 /// angles at the sparse points that both saw or, where these are fewer than three, at points in the middle of
 /// the reference view's depth range; `None` where no such point is in both images.
-pub fn triangulation_angle(scene: &Scene, reference: usize, source: usize) -> Option<f64> {
+pub(crate) fn triangulation_angle(scene: &Scene, reference: usize, source: usize) -> Option<f64> {
     angle_of_pair(scene, &shared_angles(scene), reference, source)
 }
 

@@ -42,14 +42,14 @@ pub(super) struct Files {
 }
 
 impl Files {
-    pub fn of(folder: &Path, binary: bool) -> Files {
+    pub(super) fn of(folder: &Path, binary: bool) -> Files {
         let extension = if binary { "bin" } else { "txt" };
         let path = |stem: &str| folder.join(format!("{stem}.{extension}"));
         Files { binary, cameras: path("cameras"), images: path("images"), points: path("points3D") }
     }
 
     /// The model of a folder; binary files take precedence, as in COLMAP.
-    pub fn find(folder: &Path) -> Option<Files> {
+    pub(super) fn find(folder: &Path) -> Option<Files> {
         [true, false]
             .into_iter()
             .map(|binary| Files::of(folder, binary))
@@ -65,7 +65,7 @@ pub(super) struct Place<'a> {
 }
 
 impl Place<'_> {
-    pub fn error(&self, problem: impl Display) -> Error {
+    pub(super) fn error(&self, problem: impl Display) -> Error {
         Error::File { path: self.path.to_owned(), line: self.line, problem: problem.to_string() }
     }
 }
@@ -90,7 +90,7 @@ pub(super) enum Pinhole {
 }
 
 impl Pinhole {
-    pub fn by_name(name: &str, camera: u32, place: &Place) -> Result<Pinhole> {
+    pub(super) fn by_name(name: &str, camera: u32, place: &Place) -> Result<Pinhole> {
         match name {
             "SIMPLE_PINHOLE" => Ok(Pinhole::Simple),
             "PINHOLE" => Ok(Pinhole::Full),
@@ -101,7 +101,7 @@ impl Pinhole {
         }
     }
 
-    pub fn by_number(number: u32, camera: u32, place: &Place) -> Result<Pinhole> {
+    pub(super) fn by_number(number: u32, camera: u32, place: &Place) -> Result<Pinhole> {
         match MODELS.get(number as usize) {
             Some(name) => Pinhole::by_name(name, camera, place),
             None => Pinhole::by_name(&format!("number {number}"), camera, place),
@@ -137,7 +137,7 @@ pub(super) struct Records {
 
 impl Records {
     /// Replaces ids by cameras and indices.
-    pub fn resolve(self, files: &Files) -> Result<ColmapModel> {
+    pub(super) fn resolve(self, files: &Files) -> Result<ColmapModel> {
         let mut cameras = HashMap::new();
         for record in &self.cameras {
             let place = Place { path: &files.cameras, line: record.line };
@@ -250,7 +250,7 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    pub fn of(model: &ColmapModel) -> Layout {
+    pub(super) fn of(model: &ColmapModel) -> Layout {
         let (mut cameras, mut sizes, mut images) = (Vec::new(), Vec::new(), Vec::new());
         for (index, ModelImage { name, camera }) in model.images.iter().enumerate() {
             let parameters = [camera.fx, camera.fy, camera.cx + HALF_PIXEL, camera.cy + HALF_PIXEL];

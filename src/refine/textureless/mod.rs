@@ -45,7 +45,7 @@ const MIN_MATCHING: f64 = 0.8;
 const RIM_WEIGHT: f64 = 0.1;
 
 /// Fills each textureless region with the plane of its surroundings that the source views confirm.
-pub struct FillTextureless<'a> {
+pub(crate) struct FillTextureless<'a> {
     /// The view, as in the call, and its source views.
     pub problem: &'a Problem<'a>,
     /// Whether the window around a pixel varies no more than noise, for every pixel.

@@ -21,7 +21,7 @@ const INNER_SAMPLES: usize = 200;
 const BLUR_RADIUS: usize = 1;
 
 /// Samples of a region with their blurred gray values.
-pub struct PhotoCheck {
+pub(super) struct PhotoCheck {
     /// Along its outline.
     band: Vec<GraySample>,
     /// Inside it.
@@ -36,7 +36,7 @@ struct GraySample {
 
 impl PhotoCheck {
     /// The samples of a region's core and of the band along its outline.
-    pub fn new(image: &PackedImage, core: &[usize], band: &[usize]) -> PhotoCheck {
+    pub(super) fn new(image: &PackedImage, core: &[usize], band: &[usize]) -> PhotoCheck {
         let grid = Grid { width: image.width, height: image.height };
         let sample = |&pixel: &usize| GraySample {
             place: homogeneous(grid, pixel),
@@ -52,7 +52,7 @@ impl PhotoCheck {
 
     /// Fraction of the band that matches in the source views through a plane: the mean of the better half of
     /// the views, as the region may be occluded in the others. `None` where too few views see it.
-    pub fn matching_fraction(&self, problem: &Problem, plane: DVec3) -> Option<f64> {
+    pub(super) fn matching_fraction(&self, problem: &Problem, plane: DVec3) -> Option<f64> {
         let mut fractions: Vec<f64> =
             problem.sources.iter().filter_map(|source| self.matching_fraction_in(source, plane)).collect();
         if fractions.len() < MIN_VIEWS {

@@ -34,7 +34,7 @@ const BAND_WIDTH: usize = 4;
 const BAND_SAMPLES: usize = 400;
 
 /// A set of pixels. Emptying it is free of charge, so that one set serves all regions.
-pub struct PixelSet {
+pub(super) struct PixelSet {
     /// The generation in which a pixel was last inserted.
     inserted: Vec<u32>,
     generation: u32,
@@ -42,7 +42,7 @@ pub struct PixelSet {
 
 impl PixelSet {
     /// An empty set of pixels of an image with this many.
-    pub fn new(pixels: usize) -> PixelSet {
+    pub(super) fn new(pixels: usize) -> PixelSet {
         PixelSet { inserted: vec![0; pixels], generation: 1 }
     }
 
@@ -67,7 +67,7 @@ impl PixelSet {
 
 /// The sides of a region's pixels that are its outline.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Outline {
+pub(super) struct Outline {
     /// Those with a validated pixel beyond.
     surface_sides: usize,
     /// Those at the border of the image.
@@ -76,19 +76,19 @@ pub struct Outline {
 
 impl Outline {
     /// Fraction of the outline with a surface beyond.
-    pub fn surface_fraction(self) -> f64 {
+    pub(super) fn surface_fraction(self) -> f64 {
         self.surface_sides as f64 / (self.surface_sides + self.border_sides).max(1) as f64
     }
 
     /// Whether enough of the outline of a region with this area in pixels has a surface beyond.
-    pub fn is_surrounded(self, area: usize) -> bool {
+    pub(super) fn is_surrounded(self, area: usize) -> bool {
         let min_sides = MIN_SURFACE_SIDES * (area as f64).sqrt();
         self.surface_sides as f64 >= min_sides && self.surface_fraction() >= MIN_SURFACE_FRACTION
     }
 }
 
 /// A connected region of open pixels.
-pub struct Region {
+pub(super) struct Region {
     grid: Grid,
     /// Its pixels; the first one first, the others by their distance from it.
     pub core: Vec<usize>,
@@ -99,13 +99,13 @@ pub struct Region {
 }
 
 /// Whether a pixel is textureless and has a plane that is not validated.
-pub fn is_open(planes: &[PixelEstimate], is_textureless: &[bool], pixel: usize) -> bool {
+pub(super) fn is_open(planes: &[PixelEstimate], is_textureless: &[bool], pixel: usize) -> bool {
     is_textureless[pixel] && !planes[pixel].validated && planes[pixel].depth > 0.0
 }
 
 /// Whether each textureless pixel is connected to textureless pixels that end within the image. Those that
 /// continue beyond its border may be a sky, and what surrounds a sky is in front of it.
-pub fn find_enclosed(grid: Grid, is_textureless: &[bool]) -> Vec<bool> {
+pub(super) fn find_enclosed(grid: Grid, is_textureless: &[bool]) -> Vec<bool> {
     let mut is_enclosed = vec![false; is_textureless.len()];
     let mut is_traced = vec![false; is_textureless.len()];
     for first in 0..is_textureless.len() {
@@ -136,7 +136,7 @@ pub fn find_enclosed(grid: Grid, is_textureless: &[bool]) -> Vec<bool> {
 
 impl Region {
     /// The open pixels that are connected to an open one.
-    pub fn trace(
+    pub(super) fn trace(
         grid: Grid,
         planes: &[PixelEstimate],
         is_textureless: &[bool],
@@ -166,13 +166,13 @@ impl Region {
     }
 
     /// All of its pixels.
-    pub fn pixels(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(super) fn pixels(&self) -> impl Iterator<Item = usize> + '_ {
         self.core.iter().chain(&self.grown).copied()
     }
 
     /// Adds the adjacent pixels with similar gray values: their windows reach over the outline and have
     /// matched by what is beyond.
-    pub fn grow(&mut self, image: &PackedImage, planes: &[PixelEstimate], scratch: &mut PixelSet) {
+    pub(super) fn grow(&mut self, image: &PackedImage, planes: &[PixelEstimate], scratch: &mut PixelSet) {
         let grid = self.grid;
         let neighbors = |pixel| grid.four_neighbors(pixel).into_iter().flatten();
         scratch.reset(&self.core);
@@ -200,7 +200,7 @@ impl Region {
     }
 
     /// The validated pixels among the grown ones and in the rim around all.
-    pub fn rim(&self, planes: &[PixelEstimate], scratch: &mut PixelSet) -> Vec<usize> {
+    pub(super) fn rim(&self, planes: &[PixelEstimate], scratch: &mut PixelSet) -> Vec<usize> {
         let mut front: Vec<usize> = self.pixels().collect();
         scratch.reset(&front);
         let mut rim: Vec<usize> =
@@ -219,7 +219,7 @@ impl Region {
     }
 
     /// Samples of its pixels along its outline.
-    pub fn outline_band(&self, scratch: &mut PixelSet) -> Vec<usize> {
+    pub(super) fn outline_band(&self, scratch: &mut PixelSet) -> Vec<usize> {
         let mut inside: Vec<usize> = self.pixels().collect();
         let mut band = Vec::new();
         for _ in 0..BAND_WIDTH {

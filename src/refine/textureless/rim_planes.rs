@@ -24,7 +24,7 @@ const MIN_DETERMINANT: f64 = 1e-6;
 
 /// A validated pixel beside a region.
 #[derive(Debug, Clone, Copy)]
-pub struct RimSample {
+pub(super) struct RimSample {
     /// Column, row and 1.
     pub place: DVec3,
     /// Inverse of its depth.
@@ -33,7 +33,7 @@ pub struct RimSample {
 
 /// A plane that many samples are on.
 #[derive(Debug, Clone, Copy)]
-pub struct RimPlane {
+pub(super) struct RimPlane {
     /// Its coefficients: `inverse depth = plane . [x y 1]`.
     pub plane: DVec3,
     /// Fraction of all samples that are on it.
@@ -49,7 +49,7 @@ impl RimSample {
 
 /// The planes with the most samples, by the number that the planes before left over. The random numbers
 /// depend on the region and the number of samples only.
-pub fn fit_rim_planes(samples: &[RimSample], region: u64) -> Vec<RimPlane> {
+pub(super) fn fit_rim_planes(samples: &[RimSample], region: u64) -> Vec<RimPlane> {
     let mut left = samples.to_vec();
     let mut random = Random::new(region, samples.len() as u64);
     let mut planes = Vec::new();
