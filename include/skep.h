@@ -240,7 +240,8 @@ size_t skep_last_error(char *buffer, size_t capacity);
  *       fast: downscale=2 food_sources=2 iterations=4+3x1; downscale=1 food_sources=2 iterations=0+0x1
  *       paper: downscale=1 food_sources=10 iterations=20+3x2
  *   schedule.min_changed_fraction
- *       A scale ends early once fewer than this fraction of the pixels changed in a cycle.
+ *       From the second cycle of a scale on, the scale ends early once fewer than this fraction of the pixels
+ *       changed their depth.
  *       number, 0 to 1, fraction of the pixels; default: 0.01
  *
  * Window: which samples make a patch and how they are weighted.
@@ -883,7 +884,8 @@ typedef int32_t (*skep_progress_fn)(void *user, const struct skep_progress *prog
 #define SKEP_PIXEL_NO_TEXTURE 2
 
 /**
- * The plane is visible in fewer than two source views.
+ * There is no plane, or it is visible in fewer source views than matching needs: two, or one with option
+ * "check.min_consistent_views" = 1.
  */
 #define SKEP_PIXEL_NO_SOURCES 3
 
@@ -1547,9 +1549,9 @@ skep_status skep_stepper_search(const struct skep_stepper *stepper,
  *   1. consistency check: compares the planes with those of the source views; writes the
  *      number of consistent views, and which planes are validated
  *   2. correction of foreground fattening, if the scale may end with this cycle (option
- *      "refine.fattening_passes"): gives pixels beside a depth edge the plane of the surface that their gray
- *      values belong to, or none; changes depths and normals, and in the last
- *      cycle takes the validation of some
+ *      "refine.fattening_passes"): gives validated pixels beside a depth edge the plane of the surface
+ *      behind where their gray values are closer to it; in the last cycle some keep their plane and lose
+ *      their validation
  *   3. plane smoothing (option "refine.smoothing_passes"): changes depths and normals
  *   4. publication of the validated surface, which the searches of the next cycle and the averaging of
  *      skep_stepper_finish read
@@ -1598,8 +1600,8 @@ skep_status skep_stepper_upsample(const struct skep_stepper *stepper,
                                   struct skep_estimate **estimate_out);
 
 /**
- * Gets the cycle that follows a cycle. A scale ends early when the fraction of changed pixels in all given
- * estimates is below option "schedule.min_changed_fraction".
+ * Gets the cycle that follows a cycle. From its second cycle on, a scale ends early when the fraction of
+ * changed pixels in all given estimates is below option "schedule.min_changed_fraction".
  *
  * Reads the numbers of changed pixels only.
  *

@@ -28,7 +28,8 @@
 //       fast: downscale=2 food_sources=2 iterations=4+3x1; downscale=1 food_sources=2 iterations=0+0x1
 //       paper: downscale=1 food_sources=10 iterations=20+3x2
 //   schedule.min_changed_fraction
-//       A scale ends early once fewer than this fraction of the pixels changed in a cycle.
+//       From the second cycle of a scale on, the scale ends early once fewer than this fraction of the pixels
+//       changed their depth.
 //       number, 0 to 1, fraction of the pixels; default: 0.01
 //
 // Window: which samples make a patch and how they are weighted.

@@ -68,8 +68,8 @@ class Options(Mapping[str, Value]):
     downscale=2 food_sources=2 iterations=4+3x1; downscale=1 food_sources=2 iterations=0+0x1, paper:
     downscale=1 food_sources=10 iterations=20+3x2)"""
     schedule_min_changed_fraction: float
-    """A scale ends early once fewer than this fraction of the pixels changed in a cycle. (number, 0 to 1,
-    fraction of the pixels; default: 0.01)"""
+    """From the second cycle of a scale on, the scale ends early once fewer than this fraction of the pixels
+    changed their depth. (number, 0 to 1, fraction of the pixels; default: 0.01)"""
     window_window_radius: int
     """Half the side of the window. (whole number, 1 to 16, pixels; default: 5)"""
     window_full_size_window_radius: int
