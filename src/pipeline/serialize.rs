@@ -143,13 +143,17 @@ impl AnyEstimate {
         let mut view_sets = ViewSets::empty(pixels, sources);
         let mut planes = Vec::with_capacity(pixels);
         for pixel in 0..pixels {
-            planes.push(reader.plane().ok_or_else(|| {
+            planes.push(reader.plane(stage == CHECKED).ok_or_else(|| {
                 let place = format!("column {}, row {}", pixel % width as usize, pixel / width as usize);
                 error(format!("an estimate with an invalid plane at {place}"), "undamaged bytes")
             })?);
             for word in 0..words {
                 let bits = u32::from_le_bytes(reader.take().unwrap_or([0; 4]));
-                for source in (word * 32..sources.min(word * 32 + 32)).filter(|s| bits >> (s % 32) & 1 != 0) {
+                for source in (word * 32..word * 32 + 32).filter(|source| bits >> (source % 32) & 1 != 0) {
+                    if source >= sources {
+                        let value = format!("a view set with source {source} at pixel {pixel}");
+                        return Err(error(value, format!("sources below their number, {sources}")));
+                    }
                     view_sets.insert(pixel, source);
                 }
             }
@@ -208,12 +212,12 @@ impl Reader<'_> {
         Ok(CycleRecord { downscale, cycle, pixels, changed, validated })
     }
 
-    /// A pixel's plane, `None` if its values are invalid.
-    fn plane(&mut self) -> Option<PixelEstimate> {
+    /// A pixel's plane, `None` if its values are invalid. Only a check validates planes.
+    fn plane(&mut self, is_checked: bool) -> Option<PixelEstimate> {
         let [depth, x, y, z, cost] = [(); 5].map(|()| self.f32().unwrap_or(0.0));
         let [consistent_views, validated] = self.take::<2>().unwrap_or([0; 2]);
         let normal = Vec3::new(x, y, z);
-        let is_usual = depth.is_finite() && depth >= 0.0 && cost >= 0.0 && validated <= 1;
+        let is_usual = depth.is_finite() && depth >= 0.0 && cost >= 0.0 && validated <= u8::from(is_checked);
         let fits = match depth > 0.0 {
             true => is_unit(normal),
             false => normal.is_finite() && validated == 0,
