@@ -105,8 +105,10 @@ fn run(stepper: &Stepper, travel: &dyn Travel) -> Vec<ViewEstimate<Checked>> {
 }
 
 fn assert_same(stepper: &Stepper, estimates: &[ViewEstimate<Checked>], whole: &Reconstruction) {
+    let mut results = Vec::new();
     for (view, expected) in whole.views.iter().enumerate() {
         let found = stepper.finish(view, &known(estimates), &ignore_progress).unwrap();
+        results.push(found.clone());
         assert_eq!(found.raw, expected.raw, "maps of view {view}");
         assert_eq!(found.status, expected.status);
         assert_eq!(found.cost, expected.cost);
@@ -114,6 +116,9 @@ fn assert_same(stepper: &Stepper, estimates: &[ViewEstimate<Checked>], whole: &R
         assert_eq!(found.sources, expected.sources);
         assert_eq!((found.counts, found.cycles), (expected.counts, expected.cycles.clone()));
     }
+    assert_eq!(stepper.fuse(&scene(), &results, &ignore_progress).unwrap(), whole.points);
+    let refused = stepper.fuse(&scene(), &results[1..], &ignore_progress).unwrap_err().to_string();
+    assert!(refused.starts_with("results is 3 views"), "{refused}");
 }
 
 #[test]
@@ -239,6 +244,12 @@ fn damaged_or_foreign_bytes_are_no_estimate() {
     let depth = bytes.len() - 26 * 64 * 48;
     not_a_number[depth..depth + 4].copy_from_slice(&f32::NAN.to_le_bytes());
     assert!(read(&not_a_number).unwrap_err().to_string().contains("column 0, row 0"));
+    // The last pixel: its flag, which only a check sets, and a bit of a view set beyond the source list.
+    for (place, value) in [(bytes.len() - 5, 1), (bytes.len() - 1, 0x80)] {
+        let mut changed = bytes.clone();
+        changed[place] |= value;
+        assert!(read(&changed).is_err(), "byte {place}");
+    }
     let other =
         Stepper::new(&procedural::plane_and_sphere().only(&[0, 1]).scene(), &Options::paper()).unwrap();
     assert!(AnyEstimate::from_bytes(&other, &bytes).is_err());

@@ -4,9 +4,8 @@
 //! are independent of each other and may be made on different threads or machines. The result has the bits of
 //! `skep::reconstruct`.
 
-use skep::fusion::{FusionView, fuse, overlaps};
 use skep::ignore_progress;
-use skep::{Checked, EstimateRef, Options, PointCloud, Scene, Searched, Stepper, ViewEstimate, ViewResult};
+use skep::{Checked, EstimateRef, Options, PointCloud, Searched, Stepper, ViewEstimate, ViewResult};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -48,7 +47,7 @@ fn run(folder: &Path) -> skep::Result<PointCloud> {
     let last = known(&estimates);
     let finish = |view| stepper.finish(view, &last, &ignore_progress);
     let results: Vec<ViewResult> = (0..stepper.views()).map(finish).collect::<skep::Result<_>>()?;
-    fuse_results(&scene, &options, &results)
+    stepper.fuse(&scene, &results, &ignore_progress)
 }
 
 /// The estimates as the stepper takes them: one entry for each view; `None` is a view of which nothing is
@@ -99,18 +98,4 @@ fn report(stepper: &Stepper, cycle: usize, estimates: &[ViewEstimate<Checked>]) 
         share(changed),
         share(validated)
     );
-}
-
-fn fuse_results(scene: &Scene, options: &Options, results: &[ViewResult]) -> skep::Result<PointCloud> {
-    let overlaps = overlaps(results.len(), scene.points());
-    let views: Vec<FusionView> = (scene.views().iter().zip(results).zip(&overlaps))
-        .map(|((view, result), overlap)| FusionView {
-            camera: &view.camera,
-            maps: &result.raw,
-            status: Some(&result.status),
-            picture: Some(&view.picture),
-            overlap,
-        })
-        .collect();
-    fuse(&views, &options.fusion, &ignore_progress)
 }

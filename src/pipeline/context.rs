@@ -146,7 +146,8 @@ impl RunContext {
     /// Units of work of searching all views in the cycles before this one.
     pub(super) fn work_before(&self, cycle: usize) -> u64 {
         let pixels = |scale: usize| self.scaled[scale].iter().map(|view| view.camera.pixels() as u64).sum();
-        self.cycles[..cycle].iter().map(|cycle| cycle.work(pixels(cycle.scale_index))).sum()
+        let works = self.cycles[..cycle].iter().map(|cycle| cycle.work(pixels(cycle.scale_index)));
+        works.fold(0, u64::saturating_add)
     }
 
     /// The progress of the run in a phase of a view.

@@ -29,10 +29,10 @@ impl Cycle {
     }
 
     /// Units of work of searching this many pixels: a unit is a food source that is filled or improved, those
-    /// of both checkerboard colors together counted once.
-    pub(super) fn work(&self, pixels: u64) -> u64 {
+    /// of both checkerboard colors together counted once. The time of a search is about proportional to it.
+    pub fn work(&self, pixels: u64) -> u64 {
         let passes = 1 + 2 * u64::from(self.iterations());
-        pixels * passes * u64::from(self.scale.food_sources) / 2
+        pixels.saturating_mul(passes * u64::from(self.scale.food_sources)) / 2
     }
 }
 

@@ -61,7 +61,7 @@ fn run(scene: &Scene, options: &Options, report: ProgressFn) -> Result<Reconstru
     let views = finish(&context, estimates, &tracker)?;
     let warnings = context.warnings().to_vec();
     drop(context);
-    let points = stages::fuse(scene, options, &views, &tracker)?;
+    let points = stages::fuse(scene, options, &views, &|at| tracker.report_fusion(at))?;
     Ok(Reconstruction { views, points, warnings })
 }
 

@@ -4,7 +4,6 @@
 use super::context::RunContext;
 use super::cycle::{CycleRecord, Place};
 use super::estimate::{Checked, Searched, Unfilled, Unpublished, ViewEstimate, maps_of};
-use super::progress::Tracker;
 use super::result::ViewResult;
 use super::sources::{PublishedSurfaces, SourcePlanes};
 use super::status;
@@ -15,7 +14,7 @@ use crate::fusion::{self, FusionView, PointCloud};
 use crate::geometry::ViewSets;
 use crate::matching::Problem;
 use crate::options::Options;
-use crate::parallel::Advance;
+use crate::parallel::{Advance, ProgressFn};
 use crate::refine::Filter;
 use crate::refine::foreground_fattening::CorrectFattening;
 use crate::refine::gap_filling::FillGaps;
@@ -360,7 +359,7 @@ pub(super) fn fuse(
     scene: &Scene,
     options: &Options,
     results: &[ViewResult],
-    tracker: &Tracker,
+    progress: ProgressFn,
 ) -> Result<PointCloud> {
     let overlaps = fusion::overlaps(results.len(), scene.points());
     let views: Vec<FusionView> = (scene.views().iter().zip(results).zip(&overlaps))
@@ -372,7 +371,7 @@ pub(super) fn fuse(
             overlap,
         })
         .collect();
-    fusion::fuse(&views, &options.fusion, &|at| tracker.report_fusion(at))
+    fusion::fuse(&views, &options.fusion, progress)
 }
 
 /// Pixels with depth and normal.

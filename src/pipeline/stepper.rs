@@ -8,6 +8,7 @@ use super::result::ViewResult;
 use super::sources::{PublishedSurfaces, SourcePlanes};
 use super::stages::{self, Candidates, SearchInput};
 use crate::error::{Error, Result};
+use crate::fusion::PointCloud;
 use crate::options::Options;
 use crate::parallel::{Phase, ProgressFn};
 use crate::scene::Scene;
@@ -208,6 +209,21 @@ impl Stepper {
         let sources = SourcePlanes::new(self.sources(view), known);
         stages::recheck(&self.0, &problem, filled, sources, &advance)?.write_to(&mut planes);
         stages::classify(&self.0, &problem, own.clone(), planes, &advance)
+    }
+
+    /// Fuses the validated pixels of the results of all views into points.
+    ///
+    /// # Errors
+    /// A scene or results of another number of views than the stepper has; [`Error::Cancelled`] when
+    /// `progress` breaks.
+    pub fn fuse(&self, scene: &Scene, results: &[ViewResult], progress: ProgressFn) -> Result<PointCloud> {
+        for (name, count) in [("scene", scene.views().len()), ("results", results.len())] {
+            if count != self.views() {
+                let expected = format!("the {} views of the stepper", self.views());
+                return Err(Error::argument(name, format!("{count} views"), expected));
+            }
+        }
+        stages::fuse(scene, &self.0.options, results, progress)
     }
 
     pub(super) fn context(&self) -> &RunContext {

@@ -4,9 +4,8 @@
 //! The stages are those of [`skep::reconstruct`] in the same order, one view at a time, so the result has the
 //! same bits. It is slower: the views are processed one at a time.
 
-use skep::fusion::{FusionView, fuse, overlaps};
 use skep::io::{write_depth_preview, write_normal_preview, write_views_preview};
-use skep::{Checked, Options, PointCloud, Progress, ProgressFn, Reconstruction, Result, Scene};
+use skep::{Checked, Options, Progress, ProgressFn, Reconstruction, Result, Scene};
 use skep::{EstimateRef, Searched, Stepper, ViewEstimate, ViewResult, ignore_progress};
 use std::path::{Path, PathBuf};
 
@@ -33,7 +32,8 @@ pub fn reconstruct(
     let last = known(&estimates);
     let finish = |view| stepper.finish(view, &last, &ignore_progress);
     let views: Vec<ViewResult> = (0..stepper.views()).map(finish).collect::<Result<_>>()?;
-    let points = fused(scene, options, &views, progress)?;
+    let fusing = |at: &Progress| progress(&Progress { done: 1.0 - FUSION_SHARE * (1.0 - at.done), ..*at });
+    let points = stepper.fuse(scene, &views, &fusing)?;
     Ok(Reconstruction { views, points, warnings: stepper.warnings().to_vec() })
 }
 
@@ -81,11 +81,9 @@ impl Dump<'_> {
 
     /// Fraction of the whole run that is done at a fraction of a view's search.
     fn done(&self, cycle: usize, view: usize, share: f64) -> f64 {
-        // A pass over a pixel costs as much as it has food sources; an iteration has two colors.
-        let work = |cycle: &skep::Cycle| {
-            let passes = 1 + 2 * u64::from(cycle.iterations());
-            (passes * u64::from(cycle.scale.food_sources)) as f64 / f64::from(cycle.scale.downscale).powi(2)
-        };
+        let pixels = |view: &skep::View| u64::from(view.camera.width) * u64::from(view.camera.height);
+        let pixels: u64 = self.scene.views().iter().map(pixels).sum();
+        let work = |cycle: &skep::Cycle| cycle.work(pixels / u64::from(cycle.scale.downscale).pow(2)) as f64;
         let works: Vec<f64> = self.stepper.cycles().iter().map(work).collect();
         let before: f64 = works[..cycle].iter().sum();
         let now = works[cycle] * (view as f64 + share) / self.stepper.views() as f64;
@@ -112,25 +110,4 @@ impl Dump<'_> {
         }
         Ok(())
     }
-}
-
-/// The cloud of the finished views.
-fn fused(
-    scene: &Scene,
-    options: &Options,
-    results: &[ViewResult],
-    progress: ProgressFn,
-) -> Result<PointCloud> {
-    let overlaps = overlaps(results.len(), scene.points());
-    let views: Vec<FusionView> = (scene.views().iter().zip(results).zip(&overlaps))
-        .map(|((view, result), overlap)| FusionView {
-            camera: &view.camera,
-            maps: &result.raw,
-            status: Some(&result.status),
-            picture: Some(&view.picture),
-            overlap,
-        })
-        .collect();
-    let progress = |at: &Progress| progress(&Progress { done: 1.0 - FUSION_SHARE * (1.0 - at.done), ..*at });
-    fuse(&views, &options.fusion, &progress)
 }
