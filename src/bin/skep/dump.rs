@@ -5,8 +5,8 @@
 //! same bits. It is slower: the views are processed one at a time.
 
 use skep::io::{write_depth_preview, write_normal_preview, write_views_preview};
-use skep::{Checked, Options, Progress, ProgressFn, Reconstruction, Result, Scene};
-use skep::{EstimateRef, Searched, Stepper, ViewEstimate, ViewResult, ignore_progress};
+use skep::{Checked, Error, Options, Phase, Progress, ProgressFn, Reconstruction, Result, Scene};
+use skep::{EstimateRef, Searched, Stepper, ViewEstimate, ViewResult};
 use std::path::{Path, PathBuf};
 
 /// Fraction of the progress that fusion takes; a rough measurement on photographs.
@@ -25,12 +25,14 @@ pub fn reconstruct(
     let mut estimates = Vec::new();
     let mut next = Some(0);
     while let Some(cycle) = next {
-        estimates = dump.check(&dump.search(cycle, estimates)?)?;
+        estimates = dump.check(cycle, &dump.search(cycle, estimates)?)?;
         dump.write(cycle, &estimates)?;
         next = stepper.next(cycle, &known(&estimates))?;
     }
     let last = known(&estimates);
-    let finish = |view| stepper.finish(view, &last, &ignore_progress);
+    // The end of the run is short beside its cycles: it cancels, and the share stays.
+    let finishing = |at: &Progress| progress(&Progress { done: 1.0 - FUSION_SHARE, ..*at });
+    let finish = |view| stepper.finish(view, &last, &finishing);
     let views: Vec<ViewResult> = (0..stepper.views()).map(finish).collect::<Result<_>>()?;
     let fusing = |at: &Progress| progress(&Progress { done: 1.0 - FUSION_SHARE * (1.0 - at.done), ..*at });
     let points = stepper.fuse(scene, &views, &fusing)?;
@@ -74,9 +76,27 @@ impl Dump<'_> {
     }
 
     /// Checks every view against the searched estimates of all.
-    fn check(&self, searched: &[ViewEstimate<Searched>]) -> Result<Vec<ViewEstimate<Checked>>> {
+    fn check(&self, cycle: usize, searched: &[ViewEstimate<Searched>]) -> Result<Vec<ViewEstimate<Checked>>> {
         let found: Vec<_> = searched.iter().map(|found| Some(EstimateRef::Searched(found))).collect();
-        searched.iter().map(|own| self.stepper.check(own, &found)).collect()
+        let check = |own: &ViewEstimate<Searched>| {
+            self.report_check(cycle, own.view())?;
+            self.stepper.check(own, &found)
+        };
+        searched.iter().map(check).collect()
+    }
+
+    /// Reports the check of a view, which takes no callback of its own.
+    fn report_check(&self, cycle: usize, view: usize) -> Result<()> {
+        let (at, views) = (self.stepper.cycles()[cycle], self.stepper.views());
+        let progress = Progress {
+            phase: Phase::Check,
+            downscale: at.scale.downscale,
+            cycle: at.cycle,
+            view,
+            views,
+            done: self.done(cycle, views, 0.0),
+        };
+        if (self.progress)(&progress).is_break() { Err(Error::Cancelled) } else { Ok(()) }
     }
 
     /// Fraction of the whole run that is done at a fraction of a view's search.
