@@ -24,8 +24,8 @@ use crate::scene::Scene;
 /// 3. [`check`](Stepper::check) every view against the searched estimates of this cycle;
 /// 4. call [`next`](Stepper::next) for the next cycle.
 ///
-/// After the last, [`finish`](Stepper::finish) every view and fuse. For all views, this gives the same bits
-/// as [`reconstruct`](crate::reconstruct).
+/// After the last, [`finish`](Stepper::finish) every view and [`fuse`](Stepper::fuse) the results. This gives
+/// the same bits as [`reconstruct`](crate::reconstruct).
 ///
 /// The estimates of other views are passed as one entry for each view of the scene; `None` where a view has
 /// no estimate. Each call reads only the entries that its documentation names.
