@@ -19,6 +19,7 @@ fn fusion(criterion: &mut Criterion) {
             camera: &view.camera,
             maps,
             status: None,
+            confidence: None,
             picture: Some(&view.picture),
             overlap,
         })

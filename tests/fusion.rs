@@ -10,7 +10,14 @@ use skep::{Error, FusionOptions, Maps, Phase, PixelStatus, PointCloud, Progress,
 use std::ops::ControlFlow;
 use std::sync::Mutex;
 
-const OPTIONS: FusionOptions = FusionOptions { depth_tolerance: 0.01, normal_tolerance: 30.0, min_views: 3 };
+const OPTIONS: FusionOptions = FusionOptions {
+    depth_tolerance: 0.01,
+    normal_tolerance: 30.0,
+    reprojection_tolerance: 0.0,
+    min_agreeing_views: 3,
+    min_agreeing_fraction: 0.0,
+    min_confidence: 0.0,
+};
 
 /// For every view all the others.
 fn all_others(views: usize) -> Vec<Vec<u32>> {
@@ -22,6 +29,7 @@ fn fusion_views<'a>(made: &'a Procedural, maps: &'a [Maps], overlap: &'a [Vec<u3
         camera: &made.views[index].camera,
         maps: &maps[index],
         status: None,
+        confidence: None,
         picture: Some(&made.views[index].picture),
         overlap: &overlap[index],
     };
@@ -100,7 +108,8 @@ fn the_cloud_keeps_about_one_point_for_each_surface_pixel() {
 fn averaging_reduces_noise() {
     let made = procedural::plane_and_sphere();
     let maps = noisy(&made.truth, 0.004);
-    let alone = fuse_maps(&made, &maps, FusionOptions { min_views: 0, depth_tolerance: 0.0, ..OPTIONS });
+    let alone =
+        fuse_maps(&made, &maps, FusionOptions { min_agreeing_views: 0, depth_tolerance: 0.0, ..OPTIONS });
     let together = fuse_maps(&made, &maps, OPTIONS);
     let (alone, together) = (mean_error(&made, &alone), mean_error(&made, &together));
     assert!(together < 0.6 * alone, "{together} against {alone}");
@@ -148,7 +157,7 @@ fn with_false_surface(outliers: usize) -> (Procedural, Vec<Maps>, f64) {
 fn a_surface_with_more_conflicting_than_consistent_views_is_dropped() {
     let false_points = |outliers: usize| {
         let (made, maps, depth) = with_false_surface(outliers);
-        let cloud = fuse_maps(&made, &maps, FusionOptions { min_views: 2, ..OPTIONS });
+        let cloud = fuse_maps(&made, &maps, FusionOptions { min_agreeing_views: 2, ..OPTIONS });
         cloud.positions.iter().filter(|point| (point[2] - depth).abs() < 0.1).count()
     };
     assert_eq!(false_points(3), 0, "three consistent views, four conflicting ones");
@@ -161,7 +170,9 @@ fn too_few_agreeing_views_make_no_points() {
     assert!(fuse_maps(&made, &made.truth[..3], OPTIONS).positions.is_empty());
     assert!(!fuse_maps(&made, &made.truth[..4], OPTIONS).positions.is_empty());
     assert!(
-        !fuse_maps(&made, &made.truth[..3], FusionOptions { min_views: 2, ..OPTIONS }).positions.is_empty()
+        !fuse_maps(&made, &made.truth[..3], FusionOptions { min_agreeing_views: 2, ..OPTIONS })
+            .positions
+            .is_empty()
     );
 }
 
@@ -172,7 +183,7 @@ fn only_overlapping_views_count() {
         all_others(made.views.len()).into_iter().map(|others| others[..2].to_vec()).collect();
     let cloud = fuse(&fusion_views(&made, &made.truth, &overlap), &OPTIONS, &ignore_progress).unwrap();
     assert!(cloud.positions.is_empty());
-    let options = FusionOptions { min_views: 2, ..OPTIONS };
+    let options = FusionOptions { min_agreeing_views: 2, ..OPTIONS };
     let cloud = fuse(&fusion_views(&made, &made.truth, &overlap), &options, &ignore_progress).unwrap();
     assert!(!cloud.positions.is_empty());
     for point in 0..cloud.views.len() {
@@ -238,7 +249,7 @@ fn a_point_names_the_view_it_started_in_and_then_views_that_see_it() {
     let (mut named, mut visible) = (0, 0);
     for (point, &position) in cloud.positions.iter().enumerate() {
         let views = cloud.views.get(point);
-        assert!(views.len() > OPTIONS.min_views as usize);
+        assert!(views.len() > OPTIONS.min_agreeing_views as usize);
         assert!(views[1..].windows(2).all(|pair| pair[0] < pair[1]));
         assert!(!views[1..].contains(&views[0]));
         for &view in views {

@@ -314,7 +314,7 @@ fn the_progress_function_is_called_and_can_cancel_in_every_phase() {
 /// Asserts that a run has no validated pixel or point, and a reason for every pixel.
 fn assert_ends_with_reasons(made: &Procedural) {
     for options in [
-        options(),
+        changed(options(), |o| o.check.few_views = 0),
         changed(Options::paper(), |o| {
             o.threads = 2;
         }),
@@ -347,7 +347,7 @@ fn two_views_suffice_if_one_consistent_source_does() {
     let mut options = changed(options(), |o| {
         o.check.min_consistent_views = 1;
     });
-    options.fusion.min_views = 1;
+    options.fusion.min_agreeing_views = 1;
     let result = run(&made, &options);
     let validated = result.views[0].status_counts()[0] as f64 / result.views[0].status.len() as f64;
     assert!(validated > 0.6, "{validated} of the pixels are validated");

@@ -50,7 +50,7 @@ fn an_option_out_of_range_is_named_with_its_value() {
         (|o| o.cost.smoothness_max_normal_error = 200.0, "cost.smoothness_max_normal_error", "200"),
         (|o| o.search.smoothness_reward = f64::INFINITY, "search.smoothness_reward", "inf"),
         (|o| o.view_selection.min_triangulation_angle = -1.0, "view_selection.min_triangulation_angle", "-1"),
-        (|o| o.view_selection.max_triangulation_angle = 3.0, "view_selection.max_triangulation_angle", "3"),
+        (|o| o.view_selection.max_triangulation_angle = 2.0, "view_selection.max_triangulation_angle", "2"),
         (|o| o.view_selection.max_incident_angle = 91.0, "view_selection.max_incident_angle", "91"),
         (|o| o.view_selection.occlusion_tolerance = -0.1, "view_selection.occlusion_tolerance", "-0.1"),
         (|o| o.check.min_consistent_views = 0, "check.min_consistent_views", "0"),
@@ -99,7 +99,7 @@ fn every_option_is_listed_and_shows_its_change() {
         |o| o.cost.best_views = 7,
         |o| o.schedule.scales[0].food_sources = 33,
         |o| o.check.ignore_occluders = !o.check.ignore_occluders,
-        |o| o.fusion.min_views = 17,
+        |o| o.fusion.min_agreeing_views = 17,
     ];
     let before: Vec<_> = Options::default().values().collect();
     for change in changes {

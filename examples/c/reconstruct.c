@@ -65,7 +65,7 @@ int main(int count, char **arguments) {
     signal(SIGINT, interrupt);
     check(skep_scene_read_colmap(arguments[1], 0, 0, &scene));
     check(skep_options_create("default", &options));
-    check(skep_options_set(options, "fusion.min_views", 2));
+    check(skep_options_set(options, "fusion.min_agreeing_views", 2));
     check(skep_reconstruct(scene, options, print_progress, NULL, &result));
     fprintf(stderr, "\n");
     check(skep_scene_get_view_count(scene, &views));

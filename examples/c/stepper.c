@@ -83,7 +83,7 @@ static skep_fusion_view fusion_view(const skep_scene *scene, const skep_result *
     skep_fusion_view fused = {0};
     skep_camera *camera = allocate(1, sizeof *camera);
     uint32_t *overlap = allocate(views, sizeof *overlap);
-    float *depth, *normal;
+    float *depth, *normal, *confidence;
     check(skep_scene_get_view(scene, view, &fused.width, &fused.height, camera));
     check(skep_scene_get_overlap(scene, view, overlap, views, &fused.overlap_count));
     fused.depth_stride_bytes = fused.width * sizeof(float);
@@ -94,6 +94,10 @@ static skep_fusion_view fusion_view(const skep_scene *scene, const skep_result *
         skep_result_get_depth(result, view, SKEP_MAPS_VALIDATED, depth, fused.depth_stride_bytes));
     check(skep_result_get_normal(result, view, SKEP_MAPS_VALIDATED, normal,
                                  fused.normal_stride_bytes));
+    fused.confidence_stride_bytes = fused.depth_stride_bytes;
+    confidence = allocate(fused.height, fused.confidence_stride_bytes);
+    check(skep_result_get_confidence(result, view, confidence, fused.confidence_stride_bytes));
+    fused.confidence_or_null = confidence;
     fused.camera = camera;
     fused.overlap = overlap;
     fused.depth = depth;
@@ -106,6 +110,7 @@ static void free_view(const skep_fusion_view *view) {
     free((void *)view->overlap);
     free((void *)view->depth);
     free((void *)view->normal);
+    free((void *)view->confidence_or_null);
 }
 
 int main(int count, char **arguments) {
@@ -123,7 +128,7 @@ int main(int count, char **arguments) {
     }
     check(skep_scene_read_colmap(arguments[1], 0, 0, &scene));
     check(skep_options_create("fast", &options));
-    check(skep_options_set(options, "fusion.min_views", 2));
+    check(skep_options_set(options, "fusion.min_agreeing_views", 2));
     check(skep_stepper_create(scene, options, &stepper));
     check(skep_stepper_get_count(stepper, NULL, &views));
     estimates = allocate(views, sizeof *estimates);

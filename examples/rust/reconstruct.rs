@@ -26,7 +26,7 @@ fn reconstruct(folder: &Path, dense: &Path) -> skep::Result<()> {
     let scene = read_scene(folder, None)?;
     // Options are fields, and have names too.
     let mut options = Options { seed: 1, ..Options::default() };
-    options.fusion.min_views = 2;
+    options.fusion.min_agreeing_views = 2;
     options.set("check.depth_tolerance", "0.01")?;
 
     let result = skep::reconstruct(&scene, &options, &show)?;

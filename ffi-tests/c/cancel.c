@@ -126,10 +126,12 @@ static void check_fusion(const scene *made) {
                                          12 * (size_t)made->width,
                                          NULL,
                                          &OTHER[view],
-                                         1};
+                                         1,
+                                         NULL,
+                                         0};
     }
     skep_options *options = quick_options();
-    REQUIRE(skep_options_set(options, "fusion.min_views", 1));
+    REQUIRE(skep_options_set(options, "fusion.min_agreeing_views", 1));
     for (int moment = 0; moment < 2; ++moment) {
         host self = {.stop_at = moment};
         const skep_status status =

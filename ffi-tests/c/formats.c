@@ -101,7 +101,7 @@ static void check_ends(void) {
     const skep_camera camera = {1, 1, 0, 0, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
     skep_options *options = NULL;
     REQUIRE(skep_options_create(NULL, &options));
-    REQUIRE(skep_options_set(options, "fusion.min_views", 0));
+    REQUIRE(skep_options_set(options, "fusion.min_agreeing_views", 0));
     for (size_t i = 0; i < sizeof expected + sizeof rounded; ++i) {
         const int is_float = i < sizeof expected;
         const size_t j = is_float ? i : i - sizeof expected;
@@ -109,7 +109,8 @@ static void check_ends(void) {
             is_float ? (const void *)&floats[j] : (const void *)&shorts[j], 1, 1, 4,
             SKEP_FORMAT_GRAY + (is_float ? SKEP_FORMAT_FLOAT : SKEP_FORMAT_16)};
         const float depth = 2, normal[3] = {0, 0, -1};
-        const skep_fusion_view view = {&camera, 1, 1, &depth, 4, normal, 12, &image, NULL, 0};
+        const skep_fusion_view view = {&camera, 1, 1, &depth, 4, normal,
+                                       12, &image, NULL, 0, NULL, 0};
         skep_cloud *cloud = NULL;
         REQUIRE(skep_fuse(&view, 1, options, NULL, NULL, &cloud));
         uint8_t color[3] = {9, 9, 9};

@@ -192,7 +192,9 @@ static void check_fusion(const scene *made) {
                                         12 * (size_t)made->width,
                                         NULL,
                                         &OTHER[view],
-                                        1};
+                                        1,
+                                        NULL,
+                                        0};
     }
     FAILS(skep_fuse(NULL, 2, NULL, NULL, NULL, OUT(skep_cloud *, 0)), SKEP_ERR_NULL, "views");
     FAILS(skep_fuse(good, 2, NULL, NULL, NULL, NULL), SKEP_ERR_NULL, "cloud_out");
@@ -272,10 +274,12 @@ static void check_garbled_maps(const scene *made) {
                                          12 * (size_t)made->width,
                                          NULL,
                                          &OTHER[view],
-                                         1};
+                                         1,
+                                         NULL,
+                                         0};
     }
     skep_options *options = quick_options();
-    REQUIRE(skep_options_set(options, "fusion.min_views", 0));
+    REQUIRE(skep_options_set(options, "fusion.min_agreeing_views", 0));
     skep_cloud *cloud = NULL;
     REQUIRE(skep_fuse(views, 2, options, NULL, NULL, &cloud));
     points all = points_of(cloud);

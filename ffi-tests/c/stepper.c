@@ -110,7 +110,9 @@ static skep_cloud *fuse(const scene *made, const skep_scene *handed_in, const sk
                                          .normal_stride_bytes = 12 * (size_t)made->width,
                                          .image_or_null = &images[view],
                                          .overlap = overlaps[view],
-                                         .overlap_count = count};
+                                         .overlap_count = count,
+                                         .confidence_or_null = maps[view].confidence,
+                                         .confidence_stride_bytes = 4 * (size_t)made->width};
     }
     skep_cloud *cloud = NULL;
     REQUIRE(skep_fuse(views, made->views, options, NULL, NULL, &cloud));

@@ -157,7 +157,7 @@ static void test_maps(const std::string &folder) {
                                    MUST(skep::map_view<float>(normal, 3)),
                                    {},
                                    std::nullopt};
-    MUST(options.set("fusion.min_views", 0));
+    MUST(options.set("fusion.min_agreeing_views", 0));
     const skep::Cloud cloud =
         MUST(skep::fuse(skep::Span<const skep::FusionView>(&view, 1), options));
     CHECK(MUST(cloud.size()) == std::size_t(cv::countNonZero(depth)));

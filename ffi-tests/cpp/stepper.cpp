@@ -52,18 +52,20 @@ void test_stepper_equal_whole() {
     FAILS(SKEP_ERR_ARGUMENT, "single view", parts[0].cloud());
 
     // Their validated maps fuse to the same points.
-    std::vector<skep::Map<float>> depths, normals;
+    std::vector<skep::Map<float>> depths, normals, confidences;
     std::vector<std::vector<std::uint8_t>> pictures;
     std::vector<skep::FusionView> views;
     for (std::uint32_t view = 0; view < 5; ++view) {
         depths.push_back(MUST(parts[view].depth(view, skep::Maps::Validated)));
         normals.push_back(MUST(parts[view].normal(view, skep::Maps::Validated)));
+        confidences.push_back(MUST(parts[view].confidence(view)));
         const skep_camera camera = MUST(scene.camera(view));
         pictures.push_back(world::picture(camera, world::width, world::height));
         views.push_back({camera, MUST(skep::map_view<float>(depths.back())),
                          MUST(skep::map_view<float>(normals.back(), 3)), MUST(scene.overlap(view)),
                          skep_image{pictures.back().data(), world::width, world::height,
-                                    world::width, SKEP_FORMAT_GRAY}});
+                                    world::width, SKEP_FORMAT_GRAY},
+                         MUST(skep::map_view<float>(confidences.back()))});
     }
     const skep::Points by_hand = MUST(MUST(skep::fuse(views, options)).points());
     const skep::Points by_run = MUST(MUST(whole.cloud()).points());

@@ -142,7 +142,7 @@ static std::array<cv::Mat, 2> our_disparities(const cv::Mat &left, const cv::Mat
     }
     skep::Options options;
     options.set("min_consistent_views", 1); // a pair has one source
-    options.set("fusion.min_views", 1);
+    options.set("fusion.min_agreeing_views", 1);
     // Near disparity 10 the default tolerance of 1 % is a tenth of a pixel; two views are not that
     // accurate.
     options.set("check.depth_tolerance", 0.02);

@@ -120,7 +120,14 @@ def scene() -> skep.Scene:
 
 
 def options(**values: skep._options.Value) -> skep.Options:
-    return skep.Options(**{"threads": 2, "fusion_min_views": 2, **values})
+    """Three views see every point, and small images make a pixel much depth."""
+    strict = {
+        "fusion_min_agreeing_views": 2,
+        "fusion_min_agreeing_fraction": 0,
+        "check_few_views": 0,
+        "check_reprojection_tolerance": 0,
+    }
+    return skep.Options(**{"threads": 2, **strict, **values})
 
 
 def slow_options() -> skep.Options:

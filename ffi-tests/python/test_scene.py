@@ -126,21 +126,21 @@ def test_cameras_are_checked():
 
 
 def test_options_are_items_and_attributes():
-    options = skep.Options(max_sources=6, fusion_min_views=2, seed=5)
+    options = skep.Options(max_sources=6, fusion_min_agreeing_views=2, seed=5)
     assert (
         options["view_selection.max_sources"]
         == options.view_selection_max_sources
         == options["max_sources"]
         == 6
     )
-    assert options["fusion.min_views"] == options.fusion_min_views == options.min_views == 2
-    options["fusion.min_views"] = 4
+    assert options["fusion.min_agreeing_views"] == options.fusion_min_agreeing_views == options.min_agreeing_views == 2
+    options["fusion.min_agreeing_views"] = 4
     options.view_propagation = False
     options.check_depth_tolerance = 0.1 + 0.2
-    assert options.fusion_min_views == 4 and options["search.view_propagation"] is False
+    assert options.fusion_min_agreeing_views == 4 and options["search.view_propagation"] is False
     assert options["check.depth_tolerance"] == 0.1 + 0.2 and options.fusion_depth_tolerance == 0.01
     assert options == skep.Options(**dict(options)) and len(options) == len(dict(options)) > 20
-    assert "fusion.min_views" in options and "best_views" in options and "best_views" in dir(options)
+    assert "fusion.min_agreeing_views" in options and "best_views" in options and "best_views" in dir(options)
     assert "seed" in repr(options)
 
 

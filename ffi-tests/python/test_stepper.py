@@ -10,7 +10,7 @@ import skep
 
 @pytest.fixture(scope="module")
 def options():
-    return skep.Options(threads=2, schedule_scales=made.TWO_SCALES, fusion_min_views=2)
+    return skep.Options(threads=2, schedule_scales=made.TWO_SCALES, fusion_min_agreeing_views=2)
 
 
 def run_by_hand(stepper, save=False):

@@ -17,12 +17,12 @@ scene = skep.Scene()
 image = np.zeros((4, 4, 3), dtype=np.uint8)
 number = scene.add_view(image, skep.Camera(np.eye(3)), order="bgr", depth_range=(1, 2))
 assert_type(number, int)
-options = skep.Options("paper", seed=1, fusion_min_views=2)
-assert_type(options.fusion_min_views, int)
+options = skep.Options("paper", seed=1, fusion_min_agreeing_views=2)
+assert_type(options.fusion_min_agreeing_views, int)
 assert_type(options.check_depth_tolerance, float)
 assert_type(options.schedule_scales, str)
 options.threads = 2
-options.min_views = 3
+options.min_agreeing_views = 3
 
 
 def progress(progress: skep.Progress) -> bool:

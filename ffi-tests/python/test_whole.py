@@ -130,6 +130,7 @@ def test_fusion_of_a_runs_validated_maps_gives_its_cloud(result, scene):
             view.validated_normal,
             photograph.image,
             scene.overlap(view.view),
+            confidence=view.confidence,
         )
         for photograph, view in zip(made.photographs(), result)
     ]
@@ -159,7 +160,9 @@ def test_a_run_warns_of_views_without_enough_sources():
     scene = skep.Scene()
     for photograph in made.photographs()[:2]:
         scene.add_view(photograph.image, photograph.camera, depth_range=made.DEPTH_RANGE)
-    found = skep.reconstruct(scene, quick())
+    options = quick()
+    options.check_few_views = 0
+    found = skep.reconstruct(scene, options)
     assert len(found.warnings) > 0 and all("source" in warning for warning in found.warnings)
     assert len(found.cloud) == 0 and found.cloud.positions.shape == (0, 3) and found.cloud.views.shape == (0,)
     assert (found[0].status == PixelStatus.NO_SOURCES).any()

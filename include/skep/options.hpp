@@ -55,8 +55,9 @@
 //       Weighted variance under which a window has no texture and costs 2.
 //       number, 0 to 1, squared gray value, of [0, 1]; default: 0.00001
 //   window.min_texture_to_noise
-//       Ratio of the window's variance to the image noise under which the pixel is not matched but filled
-//       from the surrounding planes; 0 matches all pixels.
+//       Ratio of the window's variance to the image noise under which the pixel is not matched: it keeps the
+//       plane of the cycle before where that matches in a larger window, or is filled from the surrounding
+//       planes. 0 matches all pixels.
 //       number, 0 to 1000, ratio of variances; default: 2.5, paper: 0
 //
 // Cost: how the costs of the source views become the cost of a plane, and what is added to it.
@@ -131,12 +132,17 @@
 //       switch, true or false; default: true
 //   view_selection.min_triangulation_angle
 //       Smallest triangulation angle of a source view.
-//       number, 0 to 180, degrees; default: 4, paper: 10
+//       number, 0 to 180, degrees; default: 3, paper: 10
 //   view_selection.max_triangulation_angle
 //       Largest triangulation angle of a source view.
-//       number, 0 to 180, degrees; default: 40, paper: 30
+//       number, 0 to 180, degrees; default: 60, paper: 30
+//   view_selection.min_sources
+//       Source views that a view gets at least, where as many overlap with it: if fewer lie in the range of
+//       angles, those nearest to it are added.
+//       whole number, at least 0, views; default: 6, paper: 0
 //   view_selection.max_sources
-//       Source views of a view, those of smallest triangulation angle; 0 takes all.
+//       Source views of a view at most; of more, those that are the most useful beside each other. 0 takes
+//       all.
 //       whole number, at least 0, views; default: 12, fast: 8, paper: 0
 //   view_selection.max_incident_angle
 //       Largest angle between the normal and the ray to a source view.
@@ -153,6 +159,15 @@
 //   check.normal_tolerance
 //       Largest angle between the normals of consistent planes.
 //       number, 0 to 180, degrees; default: 30
+//   check.reprojection_tolerance
+//       Reprojection error up to which depths count as equal at any triangulation angle, also beyond
+//       `depth_tolerance`; widened where the poses have larger errors. 0 leaves it to `depth_tolerance`
+//       alone.
+//       number, 0 to 100, pixels; default: 1.25, paper: 0
+//   check.slant_tolerance
+//       Reprojection error, at the distance of a window's radius, up to which normals count as equal at any
+//       triangulation angle; 0 leaves it to `normal_tolerance` alone.
+//       number, 0 to 100, pixels; default: 1, paper: 0
 //   check.min_consistent_views
 //       Source views that must be consistent to validate a plane; with 1 and `best_views` a single source
 //       view is enough to match a pixel, as scenes of two views need.
@@ -160,6 +175,10 @@
 //   check.min_consistent_fraction
 //       Fraction of the pixel's view set that must be consistent to validate a plane.
 //       number, 0 to 1, fraction of the view set; default: 0.5, paper: 0.7
+//   check.few_views
+//       Where at most this many source views see the surface, a single consistent one validates a plane, if
+//       the errors of the poses leave its depth certain; 0 asks for `min_consistent_views` everywhere.
+//       whole number, 0 to 255, views; default: 2, paper: 0
 //   check.ignore_occluders
 //       Leave source views whose own depth is clearly smaller out of that fraction: they may be occluded
 //       there.
@@ -188,9 +207,21 @@
 //   fusion.normal_tolerance
 //       Largest angle between the normals of pixels that are fused.
 //       number, 0 to 180, degrees; default: 30
-//   fusion.min_views
-//       Other views that must agree with a pixel to make a point.
+//   fusion.reprojection_tolerance
+//       Reprojection error up to which depths count as equal at any triangulation angle, also beyond
+//       `depth_tolerance`; 0 leaves it to `depth_tolerance` alone.
+//       number, 0 to 100, pixels; default: 1.25, paper: 0
+//   fusion.min_agreeing_views
+//       Other views that must agree with a pixel to make a point, where enough see the surface.
 //       whole number, at least 0, views; default: 3, paper: 4
+//   fusion.min_agreeing_fraction
+//       Fraction of the views that see the surface which must agree, at least one, where that is fewer than
+//       `min_agreeing_views`; no view may then contradict the point. 0 asks for `min_agreeing_views`
+//       everywhere.
+//       number, 0 to 1, fraction of the views; default: 0.5, paper: 0
+//   fusion.min_confidence
+//       Smallest confidence of pixels that are fused.
+//       number, 0 to 1, probability; default: 0
 // END OPTIONS
 #ifndef SKEP_OPTIONS_HPP
 #define SKEP_OPTIONS_HPP

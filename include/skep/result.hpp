@@ -89,6 +89,12 @@ class Result : public detail::Handle<skep_result, skep_result_destroy> {
     Fallible<Map<float>> cost(std::uint32_t view) const {
         return copied<float>(skep_result_get_cost, 1, view);
     }
+    template <class M> Fallible<void> confidence(std::uint32_t view, M &&map) const {
+        return detail::give(copy<float>(skep_result_get_confidence, 1, map, view));
+    }
+    Fallible<Map<float>> confidence(std::uint32_t view) const {
+        return copied<float>(skep_result_get_confidence, 1, view);
+    }
     /// SKEP_PIXEL_ values.
     template <class M> Fallible<void> status(std::uint32_t view, M &&map) const {
         return detail::give(copy<std::uint8_t>(skep_result_get_status, 1, map, view));
@@ -118,6 +124,9 @@ class Result : public detail::Handle<skep_result, skep_result_destroy> {
     }
     Fallible<MapView<const float>> borrow_cost(std::uint32_t view) const {
         return borrowed<float>(skep_result_borrow_cost, 1, view);
+    }
+    Fallible<MapView<const float>> borrow_confidence(std::uint32_t view) const {
+        return borrowed<float>(skep_result_borrow_confidence, 1, view);
     }
     Fallible<MapView<const std::uint8_t>> borrow_status(std::uint32_t view) const {
         return borrowed<std::uint8_t>(skep_result_borrow_status, 1, view);
@@ -208,6 +217,8 @@ struct FusionView {
     MapView<const float> normal;
     std::vector<std::uint32_t> overlap;
     std::optional<skep_image> image = std::nullopt;
+    /// 1 for all pixels without.
+    MapView<const float> confidence = {};
 };
 
 /// Fuses any maps.
@@ -218,6 +229,12 @@ inline Fallible<Cloud> fuse(Span<const FusionView> views, OptionsOrDefault optio
     detail::Status status = options.check();
     for (const FusionView &view : views) {
         const MapView<const float> &depth = view.depth, &normal = view.normal;
+        const MapView<const float> &sure = view.confidence;
+        if (status && sure.data && (depth.width != sure.width || depth.height != sure.height))
+            status = detail::Status::argument(
+                "views[" + std::to_string(raw.size()) + "].confidence",
+                detail::by(sure.width, sure.height),
+                detail::by(depth.width, depth.height) + ", as the depth");
         if (status && (depth.width != normal.width || depth.height != normal.height))
             status =
                 detail::Status::argument("views[" + std::to_string(raw.size()) + "].normal",
@@ -225,7 +242,8 @@ inline Fallible<Cloud> fuse(Span<const FusionView> views, OptionsOrDefault optio
                                          detail::by(depth.width, depth.height) + ", as the depth");
         raw.push_back({&view.camera, depth.width, depth.height, depth.data, depth.stride_bytes,
                        normal.data, normal.stride_bytes, view.image ? &*view.image : nullptr,
-                       view.overlap.data(), view.overlap.size()});
+                       view.overlap.data(), view.overlap.size(), view.confidence.data,
+                       view.confidence.stride_bytes});
     }
     status = std::move(status).then([&] {
         return progress.run([&](skep_progress_fn callback, void *user) {

@@ -110,7 +110,8 @@ impl<'a, S: Simd> Evaluator<'a, S> {
         self.has_texture = self.patch.has_texture(self.window);
         self.gray = self.problem.image.gray(x, y);
         let noise = self.problem.image.noise.variance(self.gray);
-        self.is_textureless = self.patch.variance() < self.rules.min_texture_to_noise * noise;
+        self.is_textureless = self.rules.min_texture_to_noise > 0.0
+            && (self.patch.variance() < self.rules.min_texture_to_noise * noise || !self.has_texture);
         let (x, y) = (x as f32, y as f32);
         self.ray = self.problem.ray(x, y);
         self.projector.set_pixel_and_views(x, y, set);

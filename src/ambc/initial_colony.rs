@@ -12,6 +12,10 @@ use crate::scene::PixelEstimate;
 use crate::simd::Simd;
 use crate::view_selection::ViewSelector;
 
+/// Mean 1 - NCC over the view set below which the previous estimate of a textureless pixel is kept. Noise
+/// alone has about 1, with a deviation of 0.1 over the samples of the window and a few views.
+const MAX_EVIDENCE_COST: f32 = 0.7;
+
 /// The view sets of a pixel, as bits over the source list.
 pub(super) struct PixelSets<'s> {
     /// The source views that see its previous estimate; all without one.
@@ -26,6 +30,8 @@ pub(super) struct InitialColony<'a, S: Simd> {
     selector: ViewSelector<'a, S>,
     /// Evaluates the food sources.
     pub evaluator: Evaluator<'a, S>,
+    /// Evaluates previous estimates of textureless pixels.
+    pub evidence: Evaluator<'a, S>,
 }
 
 impl<'a, S: Simd> InitialColony<'a, S> {
@@ -36,6 +42,7 @@ impl<'a, S: Simd> InitialColony<'a, S> {
             search,
             selector: ViewSelector::new(simd, problem, rules.view_set),
             evaluator: Evaluator::new(simd, problem, window, rules.cost),
+            evidence: Evaluator::new(simd, problem, search.evidence_window, rules.cost),
         }
     }
 
@@ -54,7 +61,7 @@ impl<'a, S: Simd> InitialColony<'a, S> {
         colony: &mut [FoodSource],
         sets: PixelSets,
     ) -> bool {
-        let InitialColony { search, selector, evaluator } = self;
+        let InitialColony { search, selector, evaluator, evidence } = self;
         let rules = &search.rules;
         let mut random = Random::new(search.random_stream, index as u64);
         let start = search.start.map(|start| start[index]).filter(|start| start.depth > 0.0);
@@ -65,7 +72,15 @@ impl<'a, S: Simd> InitialColony<'a, S> {
         let (problem, ray) = (search.problem, evaluator.ray());
         if evaluator.is_textureless() {
             let food = match start {
-                Some(start) => food_of(&start),
+                Some(start) => {
+                    evidence.set_pixel(at, sets.visible);
+                    let food = food_of(&start);
+                    let is_earned = evidence.mean_photometric_cost(&food) < MAX_EVIDENCE_COST;
+                    if !is_earned {
+                        sets.visible.fill(0);
+                    }
+                    FoodSource { validated: food.validated && is_earned, ..food }
+                }
                 None => FoodSource::random(problem, ray, &mut random, (0.0, 1.0)),
             };
             colony[0] = FoodSource { cost: MAX_COST, ..food };

@@ -13,6 +13,9 @@ pub(crate) struct Search<'a> {
     pub problem: &'a Problem<'a>,
     /// Shape and weights of the patches.
     pub window: &'a Window,
+    /// The same for previous estimates of pixels without texture in that window: they stay only where more
+    /// samples tell them from noise.
+    pub evidence_window: &'a Window,
     /// The numbers it depends on.
     pub rules: SearchRules,
     /// The pixels that are searched; `None` for all.

@@ -64,6 +64,26 @@ pub unsafe extern "C" fn skep_result_borrow_cost(
     })
 }
 
+/// Borrows the confidences of a view; see skep_result_get_confidence.
+///
+/// @param result          The result.
+/// @param view            Number of a view in the result.
+/// @param confidence_out  Receives the address of width * height floats, row after row; owned by the result.
+/// @retval SKEP_ERR_ARGUMENT  No such view in the result.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_result_borrow_confidence(
+    result: *const skep_result,
+    view: u32,
+    confidence_out: *mut *const f32,
+) -> skep_status {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        let (result, out) = unsafe { (get(result, "result")?, out(confidence_out, "confidence_out")?) };
+        out.set(result.view(view)?.confidence.as_ptr());
+        Ok(())
+    })
+}
+
 /// Borrows the status of the pixels of a view, SKEP_PIXEL_ values.
 ///
 /// @param result      The result.

@@ -42,12 +42,17 @@ pub struct skep_fusion_view {
     pub overlap: *const u32,
     /// Number of elements of `overlap`.
     pub overlap_count: usize,
+    /// height rows of width floats: the confidence of each pixel, 0 to 1; NULL: 1 for all.
+    pub confidence_or_null: *const f32,
+    /// Bytes from a row of `confidence_or_null` to the next, at least 4 * width; ignored without it.
+    pub confidence_stride_bytes: usize,
 }
 
 /// One view's copies.
 struct Own<'a> {
     camera: Camera,
     maps: Maps,
+    confidence: Option<Vec<f32>>,
     picture: Option<Picture>,
     overlap: &'a [u32],
 }
@@ -65,12 +70,22 @@ impl skep_fusion_view {
             let depth = maps::read(self.depth, size, self.depth_stride_bytes, &format!("{name}.depth"))?;
             let normal = self.normal.cast::<[f32; 3]>();
             let normal = maps::read(normal, size, self.normal_stride_bytes, &format!("{name}.normal"))?;
+            let stride = self.confidence_stride_bytes;
+            let confidence = match self.confidence_or_null.is_null() {
+                true => None,
+                false => Some(maps::read(
+                    self.confidence_or_null,
+                    size,
+                    stride,
+                    &format!("{name}.confidence_or_null"),
+                )?),
+            };
             let picture = match self.image_or_null.is_null() {
                 true => None,
                 false => Some(self.image(&format!("{name}.image"))?),
             };
             let overlap = slice(self.overlap, self.overlap_count, &format!("{name}.overlap"))?;
-            Ok(Own { camera, maps: Maps { depth, normal }, picture, overlap })
+            Ok(Own { camera, maps: Maps { depth, normal }, confidence, picture, overlap })
         }
     }
 
@@ -130,6 +145,7 @@ pub unsafe extern "C" fn skep_fuse(
                 camera: &view.camera,
                 maps: &view.maps,
                 status: None,
+                confidence: view.confidence.as_deref(),
                 picture: view.picture.as_ref(),
                 overlap: view.overlap,
             })

@@ -47,10 +47,10 @@ layout! {
     skep_image { data, width, height, stride_bytes, format }
     skep_progress { done, phase, downscale, cycle, view, view_count }
     skep_statistics { ncc_evaluations, bilinear_samples, early_terminations, status_counts }
-    skep_cycle_record { downscale, cycle, pixels, changed, validated }
+    skep_cycle_record { downscale, cycle, pixels, changed, validated, median_residual }
     skep_fusion_view {
         camera, width, height, depth, depth_stride_bytes, normal, normal_stride_bytes, image_or_null, overlap,
-        overlap_count
+        overlap_count, confidence_or_null, confidence_stride_bytes
     }
     skep_cycle { downscale, cycle_on_scale, food_sources, iterations }
     skep_estimate_info { view, cycle, is_checked, reserved, pixels, changed, validated, ncc_evaluations }

@@ -70,12 +70,15 @@ pub struct skep_cycle_record {
     pub changed: u64,
     /// Pixels that the check validated.
     pub validated: u64,
+    /// Median distance between where planes project to in the source views and where the source views' own
+    /// depths lie, in pixels of the cycle's scale: errors of the poses and of the matching. 0 without planes.
+    pub median_residual: f64,
 }
 
 impl skep_cycle_record {
     pub fn of(record: &crate::CycleRecord) -> skep_cycle_record {
-        let crate::CycleRecord { downscale, cycle, pixels, changed, validated } = *record;
-        skep_cycle_record { downscale, cycle, pixels, changed, validated }
+        let crate::CycleRecord { downscale, cycle, pixels, changed, validated, median_residual } = *record;
+        skep_cycle_record { downscale, cycle, pixels, changed, validated, median_residual }
     }
 }
 

@@ -112,6 +112,26 @@ pub unsafe extern "C" fn skep_result_get_cost(
     unsafe { give_map(result, view, out, stride_bytes, |_| Ok(()), |view, pixel| view.cost[pixel]) }
 }
 
+/// Copies the confidence of the raw depths of a view: the probability of each to be within 1 % of the true
+/// one, 0 to 1; 0 where there is none.
+///
+/// @param result        The result.
+/// @param view          Number of a view in the result.
+/// @param out           Receives height rows of width floats.
+/// @param stride_bytes  Bytes from a row of `out` to the next, at least 4 * width.
+/// @retval SKEP_ERR_ARGUMENT  No such view in the result, or a stride that is too small.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_result_get_confidence(
+    result: *const skep_result,
+    view: u32,
+    out: *mut f32,
+    stride_bytes: usize,
+) -> skep_status {
+    let confidence = |view: &ViewResult, pixel: usize| view.confidence[pixel];
+    // SAFETY: as the header demands of the caller.
+    unsafe { give_map(result, view, out, stride_bytes, |_| Ok(()), confidence) }
+}
+
 /// Copies the status of the pixels of a view: a SKEP_PIXEL_ value for each.
 ///
 /// @param result        The result.

@@ -8,6 +8,7 @@
 //!
 //! with `d_i`, `n_i` the plane of source view i transferred to the pixel.
 
+use super::DepthTolerance;
 use crate::geometry::PlaneHypothesis;
 use crate::matching::{Problem, SourceProjector};
 use crate::scene::PixelEstimate;
@@ -15,20 +16,22 @@ use crate::simd::{Simd, SimdLevel, Task, dispatch};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Relative difference of inverse depths from which on a source view's plane is another surface and has no
-/// weight.
-const MAX_DIFFERENCE: f32 = 0.01;
-
 /// Averages the validated planes of a view with the published surfaces of its sources; planes whose average
 /// is not usable stay. Returns the planes; the others are as they were.
-pub(crate) fn average(level: SimdLevel, problem: &Problem, planes: &[PixelEstimate]) -> Vec<PixelEstimate> {
+pub(crate) fn average(
+    level: SimdLevel,
+    problem: &Problem,
+    tolerance: DepthTolerance,
+    planes: &[PixelEstimate],
+) -> Vec<PixelEstimate> {
     let mut averaged = planes.to_vec();
-    dispatch(level, AverageTask { problem, planes: &mut averaged });
+    dispatch(level, AverageTask { problem, tolerance, planes: &mut averaged });
     averaged
 }
 
 struct AverageTask<'a> {
     problem: &'a Problem<'a>,
+    tolerance: DepthTolerance,
     planes: &'a mut [PixelEstimate],
 }
 
@@ -36,7 +39,7 @@ impl Task for AverageTask<'_> {
     type Output = ();
 
     fn run<S: Simd>(self, simd: S) {
-        let AverageTask { problem, planes } = self;
+        let AverageTask { problem, tolerance, planes } = self;
         let rows = planes.par_chunks_mut(problem.image.width).enumerate();
         rows.for_each(|(y, row)| {
             simd.vectorize(
@@ -46,7 +49,7 @@ impl Task for AverageTask<'_> {
                     for (x, plane) in row.iter_mut().enumerate().filter(|(_, own)| own.validated) {
                         let (x, y) = (x as f32, y as f32);
                         projector.set_pixel(x, y);
-                        average_pixel(simd, problem, &projector, problem.ray(x, y), plane);
+                        average_pixel(simd, problem, tolerance, &projector, problem.ray(x, y), plane);
                     }
                 },
             );
@@ -59,6 +62,7 @@ impl Task for AverageTask<'_> {
 fn average_pixel<S: Simd>(
     simd: S,
     problem: &Problem,
+    tolerance: DepthTolerance,
     projector: &SourceProjector<'_, S>,
     ray: Vec3,
     plane: &mut PixelEstimate,
@@ -70,7 +74,8 @@ fn average_pixel<S: Simd>(
         let projections = group.project(simd, plane.depth);
         let found = group.transfer_planes(simd, &projections);
         let difference = simd.sub(simd.mul(found.inverse_depth, simd.splat(plane.depth)), simd.splat(1.0));
-        let relative = simd.mul(difference, simd.splat(1.0 / MAX_DIFFERENCE));
+        let parallax = group.parallax(simd, &projections, plane.depth);
+        let relative = simd.div(difference, tolerance.relative(simd, parallax));
         let root = simd.sub(simd.splat(1.0), simd.mul(relative, relative));
         let same = projections.inside & found.known & simd.simd_ge(root, simd.splat(f32::MIN_POSITIVE));
         if same == 0 {
@@ -120,6 +125,7 @@ fn facing_normals<S: Simd>(
 mod tests {
     use super::*;
     use crate::ambc::Random;
+    use crate::options::Options;
     use crate::testing::{self, World};
 
     /// The world with the wall validated in all views, each depth times a factor of its own; the first view's
@@ -142,7 +148,8 @@ mod tests {
     }
 
     fn averaged(problem: &Problem, planes: &[PixelEstimate]) -> Vec<PixelEstimate> {
-        average(SimdLevel::detect(), problem, planes)
+        let tolerance = DepthTolerance::new(&Options::paper().check, 0.0);
+        average(SimdLevel::detect(), problem, tolerance, planes)
     }
 
     /// Root mean square of the relative errors of depth.

@@ -9,9 +9,17 @@
 //! validated    consistent >= min_consistent_views and consistent >= min_consistent_fraction * counted
 //! ```
 //!
+//! Beyond the paper, depths are also the same within `reprojection_tolerance` pixels of the source view, and
+//! planes have the same normal where they differ by less than `slant_tolerance` pixels at the distance of the
+//! window's radius: at small triangulation angles one pixel is much depth, and normals are noise. Both are
+//! widened by the error of the poses, as far as the residuals show it (`residual.rs`). Where at most
+//! `few_views` views are counted a single consistent one suffices, if that error leaves its depth certain.
+//!
 //! Counted are the views of the pixel's view set that have the point in their image; with `ignore_occluders`
 //! less those whose own depth is in front.
 
+use super::residual;
+use super::tolerance::{DepthTolerance, widening};
 use crate::error::Result;
 use crate::geometry::ViewSets;
 use crate::matching::{PREFETCH_DISTANCE, Problem, SourceProjector};
@@ -19,19 +27,28 @@ use crate::options::CheckOptions;
 use crate::parallel::{Advance, Bands, run_bands};
 use crate::scene::{PixelEstimate, Verdict};
 use crate::simd::{LANES, Simd, SimdLevel, Task, dispatch};
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 /// The depth tolerance of the recheck of filled pixels, as a fraction of the check's: their planes have no
 /// cost of their own as evidence.
 const RECHECK_TOLERANCE: f32 = 0.5;
+/// Largest relative error of depth, from the error of the poses, with which a single view validates a plane.
+const MAX_UNCERTAINTY: f32 = 0.003;
+/// Median residual with exact poses, in px.
+const MATCHING_ERROR: f32 = 0.25;
 
 /// The thresholds of the check.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ConsistencyRules {
-    depth_tolerance: f32,
+    depth_tolerance: DepthTolerance,
     min_normal_cosine: f32,
+    /// In px of reprojection per px of distance.
+    slant_tolerance: f32,
     min_consistent_views: usize,
     min_consistent_fraction: f32,
+    few_views: usize,
+    /// Parallax in px from which on a single view is certain.
+    min_parallax: f32,
     ignore_occluders: bool,
 }
 
@@ -45,27 +62,42 @@ pub(crate) struct DepthComparison {
 }
 
 impl ConsistencyRules {
-    /// The thresholds of these options.
-    pub(crate) fn new(options: &CheckOptions) -> ConsistencyRules {
+    /// The thresholds of these options, for planes that were matched with windows of this radius.
+    pub(crate) fn new(options: &CheckOptions, window_radius: f32, median_residual: f32) -> ConsistencyRules {
         ConsistencyRules {
-            depth_tolerance: options.depth_tolerance as f32,
+            depth_tolerance: DepthTolerance::new(options, median_residual),
             min_normal_cosine: options.normal_tolerance.to_radians().cos() as f32,
+            slant_tolerance: options.slant_tolerance as f32 * widening(options, median_residual)
+                / window_radius,
             min_consistent_views: options.min_consistent_views as usize,
             min_consistent_fraction: options.min_consistent_fraction as f32,
+            few_views: options.few_views as usize,
+            min_parallax: pose_error(median_residual) / MAX_UNCERTAINTY,
             ignore_occluders: options.ignore_occluders,
         }
     }
 
     /// The thresholds for planes that filled a gap.
     pub(crate) fn for_recheck(self) -> ConsistencyRules {
-        ConsistencyRules { depth_tolerance: RECHECK_TOLERANCE * self.depth_tolerance, ..self }
+        ConsistencyRules {
+            depth_tolerance: self.depth_tolerance.scaled(RECHECK_TOLERANCE),
+            few_views: 0,
+            ..self
+        }
     }
 
     /// Compares the depths of a plane in eight source views' frames with the source views' own, 0 where they
     /// have none.
     #[inline(always)]
-    pub(crate) fn compare<S: Simd>(&self, simd: S, depth: S::F32, own: S::F32) -> DepthComparison {
-        let tolerance = simd.mul(simd.splat(self.depth_tolerance), depth);
+    pub(crate) fn compare<S: Simd>(
+        &self,
+        simd: S,
+        depth: S::F32,
+        own: S::F32,
+        parallax: S::F32,
+    ) -> DepthComparison {
+        let relative = self.depth_tolerance.relative(simd, parallax);
+        let tolerance = simd.mul(relative, depth);
         let (behind, in_front) = (simd.sub(own, depth), simd.sub(depth, own));
         let known = simd.simd_ge(own, simd.splat(f32::MIN_POSITIVE));
         let occluding = known & !simd.simd_ge(tolerance, in_front);
@@ -75,18 +107,32 @@ impl ConsistencyRules {
         }
     }
 
-    /// Whether normals in the same frame are the same.
+    /// Whether normals in the same frame are the same by their angle.
     #[inline(always)]
     pub(crate) fn is_same_normal(&self, normal: Vec3, own: Vec3) -> bool {
         normal.dot(own) > self.min_normal_cosine
     }
 
-    /// Whether this many consistent views out of those counted validate a plane.
+    /// Whether planes whose slants differ by this much, as relative inverse depth per pixel, are the same for
+    /// a source view with this parallax in px: the normals of small triangulation angles are noise.
     #[inline(always)]
-    pub(crate) fn validates(&self, consistent: usize, counted: usize) -> bool {
-        consistent >= self.min_consistent_views
+    fn is_same_slant(&self, difference: Vec2, parallax: f32) -> bool {
+        difference.length() * parallax < self.slant_tolerance
+    }
+
+    /// Whether this many consistent views out of those counted validate a plane; the parallax of `certain`
+    /// ones is large enough for a single view.
+    #[inline(always)]
+    pub(crate) fn validates(&self, consistent: usize, certain: usize, counted: usize) -> bool {
+        (consistent >= self.min_consistent_views || counted <= self.few_views && certain > 0)
             && consistent as f32 >= self.min_consistent_fraction * counted as f32
     }
+}
+
+/// Standard deviation of the error of the poses in px, from the median residual: 1.5 medians of the absolute
+/// values of a normal distribution.
+fn pose_error(median_residual: f32) -> f32 {
+    1.5 * (median_residual.powi(2) - MATCHING_ERROR.powi(2)).max(0.0).sqrt()
 }
 
 /// The check of the planes of a reference view against those of its source views.
@@ -100,7 +146,11 @@ pub(crate) struct ConsistencyCheck<'a> {
     /// The planes of the source views, in the order of the problem's list; none of one that is unknown.
     pub sources: Vec<&'a [PixelEstimate]>,
     /// The thresholds.
-    pub rules: ConsistencyRules,
+    pub options: &'a CheckOptions,
+    /// Radius in px of the windows that the planes were matched with.
+    pub window_radius: f32,
+    /// Whether the planes filled gaps: their tolerances are tighter.
+    pub is_recheck: bool,
     /// Instruction set.
     pub level: SimdLevel,
     /// Told of the start of each band, as 0 units of work.
@@ -108,11 +158,11 @@ pub(crate) struct ConsistencyCheck<'a> {
 }
 
 impl ConsistencyCheck<'_> {
-    /// The verdict on each pixel.
+    /// The verdict on each pixel, and the median residual in px.
     ///
     /// # Errors
     /// What `advance` returns.
-    pub(crate) fn run(&self) -> Result<Vec<Verdict>> {
+    pub(crate) fn run(&self) -> Result<(Vec<Verdict>, f32)> {
         dispatch(self.level, CheckTask(self))
     }
 }
@@ -126,11 +176,14 @@ struct Band<'b> {
 }
 
 impl Task for CheckTask<'_> {
-    type Output = Result<Vec<Verdict>>;
+    type Output = Result<(Vec<Verdict>, f32)>;
 
     fn run<S: Simd>(self, simd: S) -> Self::Output {
         let CheckTask(check) = self;
         let image = check.problem.image;
+        let median_residual = residual::median(simd, check);
+        let rules = ConsistencyRules::new(check.options, check.window_radius, median_residual);
+        let rules = if check.is_recheck { rules.for_recheck() } else { rules };
         let bands = Bands::new(image.width, image.height);
         let mut verdicts = vec![(0, false); check.planes.len()];
         let chunks = verdicts.chunks_mut(bands.pixels()).enumerate();
@@ -148,12 +201,13 @@ impl Task for CheckTask<'_> {
                     let plane = &check.planes[index];
                     if plane.depth > 0.0 {
                         projector.set_pixel((index % image.width) as f32, (index / image.width) as f32);
-                        *verdict = check.verdict(simd, &projector, check.view_sets.words_of(index), plane);
+                        *verdict =
+                            check.verdict(simd, &rules, &projector, check.view_sets.words_of(index), plane);
                     }
                 }
             },
         )?;
-        Ok(verdicts)
+        Ok((verdicts, median_residual))
     }
 }
 
@@ -164,11 +218,15 @@ impl ConsistencyCheck<'_> {
     fn verdict<S: Simd>(
         &self,
         simd: S,
+        rules: &ConsistencyRules,
         projector: &SourceProjector<'_, S>,
         set: &[u32],
         plane: &PixelEstimate,
     ) -> Verdict {
-        let (mut consistent, mut counted) = (0, 0);
+        let (mut consistent, mut counted, mut certain) = (0, 0, 0);
+        let (focal_x, focal_y) = self.problem.inverse_focal;
+        let ray = projector.ray(self.problem);
+        let slant = |normal: Vec3| Vec2::new(normal.x * focal_x, normal.y * focal_y) / normal.dot(ray);
         for (index, group) in projector.groups().iter().enumerate() {
             let projections = group.project(simd, plane.depth);
             let mut known = projections.inside & ViewSets::eight(set, index);
@@ -185,25 +243,35 @@ impl ConsistencyCheck<'_> {
                 }
             }
             let depth = simd.mul(simd.load(&projections.center[2]), simd.splat(plane.depth));
-            let DepthComparison { same, ignored } = self.rules.compare(simd, depth, simd.load(&own_depths));
+            let parallax = group.parallax(simd, &projections, plane.depth);
+            let DepthComparison { same, ignored } =
+                rules.compare(simd, depth, simd.load(&own_depths), parallax);
+            let parallax = simd.store(parallax);
             counted += (known & !ignored).count_ones() as usize;
             let mut rest = known & same;
             while rest != 0 {
                 let lane = rest.trailing_zeros() as usize % LANES;
                 rest &= rest - 1;
                 let source = index * LANES + lane;
-                let normal = self.problem.sources[source].rotation * plane.normal;
+                let rotation = self.problem.sources[source].rotation;
                 let own = self.sources[source][pixels[lane] as usize].normal;
-                consistent += usize::from(self.rules.is_same_normal(normal, own));
+                let same = rules.is_same_normal(rotation * plane.normal, own)
+                    || rules.is_same_slant(
+                        slant(plane.normal) - slant(rotation.transpose() * own),
+                        parallax[lane],
+                    );
+                consistent += usize::from(same);
+                certain += usize::from(same && parallax[lane] > rules.min_parallax);
             }
         }
-        (consistent.min(255) as u8, self.rules.validates(consistent, counted))
+        (consistent.min(255) as u8, rules.validates(consistent, certain, counted))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::options::Options;
     use crate::scene::PlaneMap;
     use crate::simd::Scalar;
     use crate::testing::World;
@@ -213,23 +281,22 @@ mod tests {
 
     fn options(ignore_occluders: bool) -> CheckOptions {
         CheckOptions {
-            depth_tolerance: 0.01,
-            normal_tolerance: 30.0,
             min_consistent_views: 2,
             min_consistent_fraction: 0.7,
             ignore_occluders,
+            ..Options::paper().check
         }
     }
 
     fn rules(ignore_occluders: bool) -> ConsistencyRules {
-        ConsistencyRules::new(&options(ignore_occluders))
+        ConsistencyRules::new(&options(ignore_occluders), 5.0, 0.0)
     }
 
     /// Compares a plane at depth `scale` with a source view's own depth of `factor` times that and a normal
     /// `degrees` away.
     fn compare(rules: &ConsistencyRules, scale: f32, factor: f32, degrees: f32) -> (DepthComparison, bool) {
         let own = Vec3::new(degrees.to_radians().sin(), 0.0, -degrees.to_radians().cos());
-        let depths = rules.compare(Scalar, [scale; LANES], [scale * factor; LANES]);
+        let depths = rules.compare(Scalar, [scale; LANES], [scale * factor; LANES], [100.0; LANES]);
         (depths, rules.is_same_normal(Vec3::NEG_Z, own))
     }
 
@@ -255,6 +322,44 @@ mod tests {
     }
 
     #[test]
+    fn at_a_small_parallax_depths_within_a_pixel_and_slants_within_a_pixel_at_the_rim_are_the_same() {
+        let options = CheckOptions { reprojection_tolerance: 1.0, slant_tolerance: 1.0, ..options(true) };
+        let rules = ConsistencyRules::new(&options, 5.0, 0.0);
+        let same = |factor: f32, parallax: f32| {
+            rules.compare(Scalar, [4.0; LANES], [4.0 * factor; LANES], [parallax; LANES]).same
+        };
+        // One pixel of 40 is 2.5 % of the depth, one of 400 a quarter of a percent: 1 % remains.
+        assert_eq!([1.024, 1.026].map(|factor| same(factor, 40.0)), [0xff, 0]);
+        assert_eq!([1.009, 1.011].map(|factor| same(factor, 400.0)), [0xff, 0]);
+        // Without parallax any depth would do: at most 5 % are the same.
+        assert_eq!([1.04, 1.06].map(|factor| same(factor, 0.0)), [0xff, 0]);
+        // 1 px at 5 px, with a parallax of 40 px: a relative change of inverse depth of 0.005 a pixel.
+        let slant = |size: f32| rules.is_same_slant(Vec2::new(size, 0.0), 40.0);
+        assert!(slant(0.0049) && !slant(0.0051));
+    }
+
+    #[test]
+    fn errors_of_the_poses_widen_the_tolerance_and_leave_single_views_uncertain() {
+        let options = CheckOptions { reprojection_tolerance: 1.0, few_views: 2, ..options(true) };
+        let same = |residual: f32| {
+            let rules = ConsistencyRules::new(&options, 5.0, residual);
+            rules.compare(Scalar, [4.0; LANES], [4.0 * 1.02; LANES], [100.0; LANES]).same
+        };
+        assert_eq!([0.1, 0.3, 0.5].map(same), [0, 0, 0xff]);
+        let parallax = |residual| ConsistencyRules::new(&options, 5.0, residual).min_parallax;
+        assert_eq!(parallax(0.2), 0.0, "what matching alone leaves");
+        assert!(parallax(0.5) > 100.0);
+    }
+
+    #[test]
+    fn one_certain_view_suffices_where_few_see_the_surface() {
+        let options = CheckOptions { few_views: 2, min_consistent_fraction: 0.5, ..options(true) };
+        let rules = ConsistencyRules::new(&options, 5.0, 0.0);
+        assert!(rules.validates(1, 1, 1) && rules.validates(1, 1, 2) && rules.validates(2, 0, 4));
+        assert!(!rules.validates(1, 0, 1) && !rules.validates(1, 1, 3) && !rules.validates(0, 0, 1));
+    }
+
+    #[test]
     fn a_recheck_halves_the_depth_tolerance() {
         let recheck = rules(false).for_recheck();
         assert_eq!(compare(&recheck, 4.0, 1.0049, 29.0), (SAME, true));
@@ -277,17 +382,17 @@ mod tests {
     fn a_number_and_a_fraction_of_the_views_must_be_consistent() {
         let rules = |min_consistent_views, min_consistent_fraction| {
             let options = CheckOptions { min_consistent_views, min_consistent_fraction, ..options(true) };
-            ConsistencyRules::new(&options)
+            ConsistencyRules::new(&options, 5.0, 0.0)
         };
         let seventy = rules(2, 0.7);
-        assert!(!seventy.validates(0, 0));
-        assert!(!seventy.validates(1, 1));
-        assert!(seventy.validates(2, 2));
-        assert!(!seventy.validates(2, 3));
-        assert!(seventy.validates(3, 4));
-        assert!(seventy.validates(7, 10) && !seventy.validates(6, 10));
-        assert!(rules(2, 0.5).validates(2, 4) && !rules(2, 0.5).validates(2, 5));
-        assert!(rules(3, 0.0).validates(3, 100) && !rules(3, 0.0).validates(2, 2));
+        assert!(!seventy.validates(0, 0, 0));
+        assert!(!seventy.validates(1, 0, 1));
+        assert!(seventy.validates(2, 0, 2));
+        assert!(!seventy.validates(2, 0, 3));
+        assert!(seventy.validates(3, 0, 4));
+        assert!(seventy.validates(7, 0, 10) && !seventy.validates(6, 0, 10));
+        assert!(rules(2, 0.5).validates(2, 0, 4) && !rules(2, 0.5).validates(2, 0, 5));
+        assert!(rules(3, 0.0).validates(3, 0, 100) && !rules(3, 0.0).validates(2, 0, 2));
     }
 
     /// The verdicts on the first view's planes against those of the other views.
@@ -302,11 +407,13 @@ mod tests {
             planes: &maps[0].planes,
             view_sets,
             sources: maps[1..].iter().map(|map| &map.planes[..]).collect(),
-            rules: rules(ignore_occluders),
+            options: &options(ignore_occluders),
+            window_radius: 5.0,
+            is_recheck: false,
             level: SimdLevel::detect(),
             advance: &|_| Ok(()),
         };
-        check.run().unwrap()
+        check.run().unwrap().0
     }
 
     /// The verdict on the exact wall in the middle when the depths of the first sources are multiplied by

@@ -2,9 +2,14 @@
 //! and averaging.
 
 mod averaging;
+mod confidence;
 mod consistency;
 mod propagation;
+mod residual;
+mod tolerance;
 
 pub(crate) use averaging::average;
-pub(crate) use consistency::{ConsistencyCheck, ConsistencyRules};
+pub(crate) use confidence::confidence;
+pub(crate) use consistency::ConsistencyCheck;
 pub(crate) use propagation::{Donor, Target, candidates};
+pub(crate) use tolerance::{DepthTolerance, widening};

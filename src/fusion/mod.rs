@@ -33,6 +33,9 @@ pub struct FusionView<'a> {
     pub maps: &'a Maps,
     /// The status of every pixel: only validated ones are fused. `None` fuses all that have a depth.
     pub status: Option<&'a [PixelStatus]>,
+    /// The confidence of every pixel, 0 to 1: weighs it in the averages, and `min_confidence` filters by it.
+    /// `None` is 1 for all.
+    pub confidence: Option<&'a [f32]>,
     /// The photograph, for the colors; points are gray (128) without.
     pub picture: Option<&'a Picture>,
     /// The views that may see the same surface, as indices into the list of views.
@@ -55,7 +58,7 @@ const BAND_ROWS: u32 = 32;
 /// use glam::{DMat3, DVec3};
 /// use skep::fusion::{FusionView, fuse};
 /// use skep::geometry::Camera;
-/// use skep::{FusionOptions, Maps, ignore_progress};
+/// use skep::{FusionOptions, Maps, Options, ignore_progress};
 ///
 /// let camera = |x: f64| Camera {
 ///     width: 8,
@@ -74,10 +77,11 @@ const BAND_ROWS: u32 = 32;
 ///     camera: &cameras[index],
 ///     maps: &maps,
 ///     status: None,
+///     confidence: None,
 ///     picture: None,
 ///     overlap: &overlaps[index],
 /// };
-/// let options = FusionOptions { depth_tolerance: 0.01, normal_tolerance: 30.0, min_views: 1 };
+/// let options = FusionOptions { min_agreeing_views: 1, ..Options::default().fusion };
 /// let cloud = fuse(&[view(0), view(1)], &options, &ignore_progress)?;
 /// // The second camera sees everything one pixel further left: 7 columns are common to both.
 /// assert_eq!(cloud.positions.len(), 7 * 6);
@@ -125,6 +129,7 @@ fn check_view(views: &[FusionView], index: usize) -> Result<()> {
         ("maps.depth", Some(view.maps.depth.len())),
         ("maps.normal", Some(view.maps.normal.len())),
         ("status", view.status.map(<[PixelStatus]>::len)),
+        ("confidence", view.confidence.map(<[f32]>::len)),
     ];
     for (map, len) in lengths {
         if let Some(len) = len.filter(|len| *len != pixels) {
@@ -159,8 +164,10 @@ fn append(cloud: &mut PointCloud, points: &PointCloud) {
 }
 
 /// Depth and unit normal of a pixel, `None` where there is no usable estimate.
-fn estimate(view: &FusionView, pixel: usize) -> Option<(f64, DVec3)> {
-    if view.status.is_some_and(|status| status[pixel] != PixelStatus::Validated) {
+fn estimate(view: &FusionView, options: &FusionOptions, pixel: usize) -> Option<(f64, DVec3)> {
+    if view.status.is_some_and(|status| status[pixel] != PixelStatus::Validated)
+        || view.confidence.is_some_and(|confidence| f64::from(confidence[pixel]) < options.min_confidence)
+    {
         return None;
     }
     let depth = view.maps.depth[pixel];
@@ -216,14 +223,14 @@ impl<'a> Reference<'a> {
             if self.used[self.index].has(pixel) {
                 continue;
             }
-            let Some((depth, normal)) = estimate(view, pixel) else { continue };
+            let Some((depth, normal)) = estimate(view, self.options, pixel) else { continue };
             let position = DVec2::new(f64::from(column), f64::from(row));
             let start = Member {
                 view: self.index as u32,
                 pixel,
                 position: to_world * (view.camera.ray(position) * depth),
                 normal: to_world * normal,
-                weight: weight(view.camera, depth),
+                weight: weight(view, pixel, depth),
             };
             if !self.collect_members(start, position, depth, &mut members) {
                 continue;
@@ -248,21 +255,37 @@ impl<'a> Reference<'a> {
     fn collect_members(&self, start: Member, pixel: DVec2, depth: f64, members: &mut Vec<Member>) -> bool {
         members.clear();
         members.push(start);
-        let mut conflicts = 0;
+        let (mut conflicts, mut seeing) = (0, 0);
         for source in &self.sources {
             match source.compare(pixel, depth, &start) {
-                Comparison::Consistent(member) => members.push(member),
+                Comparison::Consistent(member) => {
+                    members.push(member);
+                    seeing += 1;
+                }
                 Comparison::SeesThrough => conflicts += 1,
+                Comparison::Sees => seeing += 1,
                 Comparison::Unknown => {}
             }
         }
-        // At edges of thin objects the pixel of another view, half a pixel off, may be on the background:
-        // only a majority of conflicts rejects a point.
-        members.len() > self.options.min_views as usize && conflicts <= members.len()
+        let agreeing = members.len() - 1;
+        let FusionOptions { min_agreeing_views, min_agreeing_fraction, .. } = *self.options;
+        if agreeing >= min_agreeing_views as usize {
+            // At edges of thin objects the pixel of another view, half a pixel off, may be on the background:
+            // only a majority of conflicts rejects a point.
+            return conflicts <= members.len();
+        }
+        min_agreeing_fraction > 0.0
+            && agreeing >= 1
+            && agreeing as f64 >= min_agreeing_fraction * f64::from(seeing)
+            && conflicts == 0
     }
 }
 
-/// Weight in the average: the inverse square of the width of a pixel on the surface.
-fn weight(camera: &Camera, depth: f64) -> f64 {
-    camera.fx * camera.fy / (depth * depth)
+/// Smallest weight of a pixel without confidence: an average has a weight.
+const MIN_CONFIDENCE_WEIGHT: f64 = 0.01;
+
+/// Weight in the average: the confidence over the square of the width of a pixel on the surface.
+fn weight(view: &FusionView, pixel: usize, depth: f64) -> f64 {
+    let confidence = view.confidence.map_or(1.0, |confidence| f64::from(confidence[pixel]));
+    confidence.max(MIN_CONFIDENCE_WEIGHT) * view.camera.fx * view.camera.fy / (depth * depth)
 }

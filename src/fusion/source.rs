@@ -12,6 +12,8 @@ pub(super) enum Comparison {
     Consistent(Member),
     /// The view's pixel has a surface clearly behind the point: the point would occlude it.
     SeesThrough,
+    /// The point is in the image and not occluded, but the pixel has no or another estimate.
+    Sees,
     /// The point is outside the image or occluded, or its pixel has no estimate or another normal.
     Unknown,
 }
@@ -19,6 +21,9 @@ pub(super) enum Comparison {
 /// How far behind a point a view's surface must be to conflict with it, in depth tolerances: at one, noise
 /// would suffice.
 const CONFLICT_TOLERANCES: f64 = 2.0;
+
+/// Most that the tolerance in pixels allows, as a fraction of the depth.
+const MAX_TOLERANCE: f64 = 0.05;
 
 /// A view that overlaps the reference, with the transforms from one to the other.
 pub(super) struct Source<'a> {
@@ -32,7 +37,7 @@ pub(super) struct Source<'a> {
     to_world: DMat3,
     /// The camera's center relative to the reference's, in world axes.
     center: DVec3,
-    depth_tolerance: f64,
+    options: &'a FusionOptions,
     min_cosine: f64,
 }
 
@@ -41,7 +46,7 @@ impl<'a> Source<'a> {
         reference: &Camera,
         index: u32,
         view: &'a FusionView<'a>,
-        options: &FusionOptions,
+        options: &'a FusionOptions,
     ) -> Source<'a> {
         let camera = view.camera;
         let center = camera.center() - reference.center();
@@ -53,7 +58,7 @@ impl<'a> Source<'a> {
             shift: camera.calibration() * (camera.rotation * -center),
             to_world: camera.rotation.transpose(),
             center,
-            depth_tolerance: options.depth_tolerance,
+            options,
             min_cosine: options.normal_tolerance.to_radians().cos(),
         }
     }
@@ -65,18 +70,25 @@ impl<'a> Source<'a> {
             return Comparison::Unknown;
         }
         let camera = self.view.camera;
-        let Some((column, row)) = camera.nearest_pixel(point.truncate() / point.z) else {
+        let place = point.truncate() / point.z;
+        let parallax = (self.shift.truncate() - place * self.shift.z).length() / point.z;
+        let of_pixels = (self.options.reprojection_tolerance / parallax).min(MAX_TOLERANCE);
+        let tolerance = of_pixels.max(self.options.depth_tolerance);
+        let Some((column, row)) = camera.nearest_pixel(place) else {
             return Comparison::Unknown;
         };
         let pixel = row as usize * camera.width as usize + column as usize;
-        let Some((depth, normal)) = estimate(self.view, pixel) else { return Comparison::Unknown };
+        let Some((depth, normal)) = estimate(self.view, self.options, pixel) else { return Comparison::Sees };
         let difference = depth - point.z;
-        if difference > CONFLICT_TOLERANCES * self.depth_tolerance * point.z {
+        if difference > CONFLICT_TOLERANCES * tolerance * point.z {
             return Comparison::SeesThrough;
         }
         let normal = self.to_world * normal;
-        if difference.abs() > self.depth_tolerance * point.z || normal.dot(start.normal) < self.min_cosine {
+        if difference.abs() > tolerance * point.z {
             return Comparison::Unknown;
+        }
+        if normal.dot(start.normal) < self.min_cosine {
+            return Comparison::Sees;
         }
         let ray = camera.ray(DVec2::new(f64::from(column), f64::from(row)));
         let position = self.center + self.to_world * (ray * depth);
@@ -85,7 +97,7 @@ impl<'a> Source<'a> {
             pixel,
             position,
             normal,
-            weight: weight(camera, depth),
+            weight: weight(self.view, pixel, depth),
         })
     }
 }

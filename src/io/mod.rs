@@ -20,6 +20,6 @@ pub use colmap_model::{ColmapModel, ModelImage};
 pub use files::write_file;
 pub use pictures::{picture_size, read_picture, write_picture};
 pub use ply::{read_ply, read_visibility, write_ply, write_visibility};
-pub use previews::{write_depth_preview, write_normal_preview, write_views_preview};
+pub use previews::{write_depth_preview, write_fraction_preview, write_normal_preview, write_views_preview};
 pub use scene_folder::{SceneFolder, read_scene, write_scene};
 pub use workspace::{MapKind, Workspace, WorkspaceMaps, WorkspaceView};

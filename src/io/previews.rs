@@ -73,6 +73,18 @@ pub fn write_views_preview(
     write_png(path, width, height, &bytes, ExtendedColorType::L8)
 }
 
+/// Writes a fraction of each pixel as brightness, white for 1.
+pub fn write_fraction_preview(
+    path: &Path,
+    width: u32,
+    height: u32,
+    fraction: impl Fn(usize) -> f32,
+) -> Result<()> {
+    let pixels = width as usize * height as usize;
+    let bytes: Vec<u8> = (0..pixels).map(|pixel| (fraction(pixel) * 255.0).round() as u8).collect();
+    write_png(path, width, height, &bytes, ExtendedColorType::L8)
+}
+
 fn write_rgb(path: &Path, width: u32, height: u32, color: impl Fn(usize) -> [u8; 3]) -> Result<()> {
     let bytes: Vec<[u8; 3]> = (0..width as usize * height as usize).map(color).collect();
     write_png(path, width, height, bytes.as_flattened(), ExtendedColorType::Rgb8)

@@ -6,7 +6,9 @@ use super::colmap_maps::{
 use super::colmap_model::ColmapModel;
 use super::files::{NAME_INSIDE, cannot_be_read, copy_file, link_or_copy, stays_inside, write_file};
 use super::ply::{write_ply, write_visibility};
-use super::previews::{write_depth_preview, write_normal_preview, write_views_preview};
+use super::previews::{
+    write_depth_preview, write_fraction_preview, write_normal_preview, write_views_preview,
+};
 use super::scene_folder::SceneFolder;
 use crate::error::{Error, Result};
 use crate::fusion::PointCloud;
@@ -78,7 +80,12 @@ impl Workspace {
         self.map("consistency_graphs", name, kind)
     }
 
-    /// `preview/NAME.WHAT.png`, `what` being `depth`, `normal` or `views`.
+    /// `stereo/confidence_maps/NAME.KIND.bin`
+    pub fn confidence_map(&self, name: &str, kind: MapKind) -> PathBuf {
+        self.map("confidence_maps", name, kind)
+    }
+
+    /// `preview/NAME.WHAT.png`, `what` being `depth`, `normal`, `views` or `confidence`.
     pub fn preview(&self, name: &str, what: &str) -> PathBuf {
         self.folder.join("preview").join(format!("{name}.{what}.png"))
     }
@@ -97,8 +104,9 @@ impl Workspace {
         if stays_inside(name) { Ok(()) } else { Err(Error::argument("view's name", name, NAME_INSIDE)) }
     }
 
-    /// Writes all files of one view: depth and normal map and consistency graph of the raw estimate
-    /// (photometric) and of the validated pixels (geometric), and previews of the latter.
+    /// Writes all files of one view: depth, normal and confidence map and consistency graph of the raw
+    /// estimate (photometric) and of the validated pixels (geometric), and previews of the latter. A
+    /// confidence map has the layout of a depth map.
     ///
     /// # Errors
     /// A name that leads outside the folder; a file that cannot be written.
@@ -108,6 +116,9 @@ impl Workspace {
         self.write_maps(name, MapKind::Raw, camera, &result.raw, result)?;
         self.write_maps(name, MapKind::Validated, camera, &validated, result)?;
         let (width, height) = (camera.width, camera.height);
+        write_fraction_preview(&self.preview(name, "confidence"), width, height, |pixel| {
+            if validated.depth[pixel] > 0.0 { result.confidence[pixel] } else { 0.0 }
+        })?;
         write_depth_preview(&self.preview(name, "depth"), width, height, &validated.depth)?;
         write_normal_preview(&self.preview(name, "normal"), width, height, &validated.normal)?;
         write_views_preview(&self.preview(name, "views"), width, height, result.sources.len(), |pixel| {
@@ -160,6 +171,11 @@ impl Workspace {
         let (width, height) = (camera.width, camera.height);
         write_depth_map(&self.depth_map(name, kind), width, height, &maps.depth)?;
         write_normal_map(&self.normal_map(name, kind), width, height, &maps.normal)?;
+        let is_estimated = maps.depth.iter().map(|&depth| depth > 0.0);
+        let confidence: Vec<f32> = (result.confidence.iter().zip(is_estimated))
+            .map(|(&confidence, is_estimated)| if is_estimated { confidence } else { 0.0 })
+            .collect();
+        write_depth_map(&self.confidence_map(name, kind), width, height, &confidence)?;
         write_consistency_graph(&self.consistency_graph(name, kind), width, height, |pixel| {
             let estimated = maps.depth[pixel] > 0.0;
             let sources = result.view_sets.iter(pixel).filter(move |_| estimated);
@@ -235,7 +251,12 @@ impl Workspace {
         let mut missing = Vec::new();
         let mut views = Vec::new();
         for image in images {
+            let mut confidence = None;
             let maps = if has_map(&image.name, kind) {
+                let path = self.confidence_map(&image.name, kind);
+                if path.is_file() {
+                    confidence = Some(sized(&path, &image.camera, read_depth_map(&path)?)?);
+                }
                 self.read_maps(&image.name, kind, &image.camera)?
             } else {
                 missing.push(image.name.clone());
@@ -244,7 +265,7 @@ impl Workspace {
             };
             let has_picture = scene.images.join(&image.name).is_file();
             let picture = has_picture.then(|| scene.read_picture(&image.name, &image.camera)).transpose()?;
-            views.push(WorkspaceView { name: image.name, camera: image.camera, maps, picture });
+            views.push(WorkspaceView { name: image.name, camera: image.camera, maps, confidence, picture });
         }
         Ok(WorkspaceMaps { views, points, kind, missing })
     }
@@ -259,6 +280,8 @@ pub struct WorkspaceView {
     pub camera: Camera,
     /// Its maps, of the camera's size; all zeros when there are none.
     pub maps: Maps,
+    /// The confidence of every pixel, 0 to 1; `None` without a file, as COLMAP writes none.
+    pub confidence: Option<Vec<f32>>,
     /// Its photograph, when the file is there.
     pub picture: Option<Picture>,
 }

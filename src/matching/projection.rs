@@ -191,6 +191,12 @@ impl<'a, S: Simd> SourceProjector<'a, S> {
         }
     }
 
+    /// The ray of the current pixel of the reference view.
+    #[inline(always)]
+    pub(crate) fn ray(&self, reference: &Problem) -> Vec3 {
+        reference.ray(self.pixel.0, self.pixel.1)
+    }
+
     /// The views of the set, ascending by index in the source list.
     #[inline(always)]
     pub(crate) fn groups(&self) -> &[Group<'a>] {
@@ -276,6 +282,18 @@ impl<'a> Group<'a> {
             row: simd.store(simd.max(simd.min(row, bottom), zero)),
             inside: simd.simd_ge(margin, zero) & in_front,
         }
+    }
+
+    /// The distance in px of each projection, at this depth, to where the point would be seen at infinity as
+    /// far as it grows linearly: a relative change of the inverse depth moves the projection by this times
+    /// the change.
+    #[inline(always)]
+    pub(crate) fn parallax<S: Simd>(&self, simd: S, projections: &Projections, depth: f32) -> S::F32 {
+        let [x, y, z] = [0, 1, 2].map(|axis| simd.load(&self.epipole[axis]));
+        let along_x = simd.sub(x, simd.mul(simd.load(&projections.column), z));
+        let along_y = simd.sub(y, simd.mul(simd.load(&projections.row), z));
+        let length = simd.sqrt(simd.mul_add(along_x, along_x, simd.mul(along_y, along_y)));
+        simd.div(length, simd.mul(simd.load(&projections.center[2]), simd.splat(depth)))
     }
 
     /// The validated surfaces of the views at these projections.

@@ -133,6 +133,11 @@ impl Window {
         self.min_variance * (SAMPLE_SCALE * SAMPLE_SCALE)
     }
 
+    /// Half of the side, in px.
+    pub(crate) fn radius(&self) -> usize {
+        self.radius
+    }
+
     /// Number of samples of a patch.
     pub fn samples(&self) -> u64 {
         self.samples

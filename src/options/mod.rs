@@ -131,6 +131,7 @@ impl Options {
     pub(crate) fn min_matched_views(&self) -> usize {
         match self.cost.best_views {
             0 => 2,
+            _ if self.check.few_views > 0 => 1,
             _ => self.check.min_consistent_views.min(2) as usize,
         }
     }

@@ -69,6 +69,7 @@ impl Options {
                 pixelwise_view_selection: true,
                 min_triangulation_angle: 10.0,
                 max_triangulation_angle: 30.0,
+                min_sources: 0,
                 max_sources: 0,
                 max_incident_angle: 80.0,
                 occlusion_tolerance: 0.01,
@@ -78,8 +79,11 @@ impl Options {
                 // relative.
                 depth_tolerance: 0.01,
                 normal_tolerance: 30.0,
+                reprojection_tolerance: 0.0,
+                slant_tolerance: 0.0,
                 min_consistent_views: 2,
                 min_consistent_fraction: 0.7,
+                few_views: 0,
                 ignore_occluders: false,
             },
             refine: RefineOptions {
@@ -88,7 +92,14 @@ impl Options {
                 cross_view_averaging: false,
                 fill_gaps: false,
             },
-            fusion: FusionOptions { depth_tolerance: 0.01, normal_tolerance: 30.0, min_views: 4 },
+            fusion: FusionOptions {
+                depth_tolerance: 0.01,
+                normal_tolerance: 30.0,
+                reprojection_tolerance: 0.0,
+                min_agreeing_views: 4,
+                min_agreeing_fraction: 0.0,
+                min_confidence: 0.0,
+            },
         }
     }
 
@@ -155,19 +166,32 @@ impl Default for Options {
                 ..paper.search
             },
             view_selection: ViewSelectionOptions {
-                min_triangulation_angle: 4.0,
-                max_triangulation_angle: 40.0,
+                min_triangulation_angle: 3.0,
+                max_triangulation_angle: 60.0,
+                min_sources: 6,
                 max_sources: 12,
                 ..paper.view_selection
             },
-            check: CheckOptions { min_consistent_fraction: 0.5, ignore_occluders: true, ..paper.check },
+            check: CheckOptions {
+                reprojection_tolerance: 1.25,
+                slant_tolerance: 1.0,
+                min_consistent_fraction: 0.5,
+                few_views: 2,
+                ignore_occluders: true,
+                ..paper.check
+            },
             refine: RefineOptions {
                 fattening_passes: 2,
                 smoothing_passes: 1,
                 cross_view_averaging: true,
                 fill_gaps: true,
             },
-            fusion: FusionOptions { min_views: 3, ..paper.fusion },
+            fusion: FusionOptions {
+                reprojection_tolerance: 1.25,
+                min_agreeing_views: 3,
+                min_agreeing_fraction: 0.5,
+                ..paper.fusion
+            },
             ..paper
         }
     }

@@ -20,6 +20,7 @@ pub(super) struct RunContext {
     pub level: SimdLevel,
     /// By scale.
     windows: Vec<Window>,
+    evidence_window: Window,
     sources: SourceLists,
     cycles: Vec<Cycle>,
     /// By scale and view.
@@ -47,6 +48,7 @@ impl RunContext {
             options: options.clone(),
             level: options.simd.unwrap_or_else(SimdLevel::detect),
             windows: (0..scales.len()).map(|scale| window(options, scale)).collect(),
+            evidence_window: evidence_window(options),
             sources: source_lists(scene, options),
             cycles: Cycle::all(options),
             scaled,
@@ -76,6 +78,11 @@ impl RunContext {
     /// The window of the patches on the scale of a cycle.
     pub(super) fn window(&self, cycle: usize) -> &Window {
         &self.windows[self.cycles[cycle].scale_index]
+    }
+
+    /// The window in which planes of textureless pixels must match.
+    pub(super) fn evidence_window(&self) -> &Window {
+        &self.evidence_window
     }
 
     /// A view on the scale of a cycle.
@@ -169,6 +176,17 @@ impl RunContext {
         }
         Ok(())
     }
+}
+
+/// Radius in px of the window in which planes of textureless pixels must match: as small as that of textured
+/// pixels, so that it does not reach what is beside a textureless region, but with all samples.
+const EVIDENCE_RADIUS: u32 = 4;
+/// Variance under which that window has no texture: twice that of rounding to 1 / 255.
+const EVIDENCE_MIN_VARIANCE: f64 = 2.0 / 12.0 / (255.0 * 255.0);
+
+fn evidence_window(options: &Options) -> Window {
+    let own = &options.window;
+    Window::disc(EVIDENCE_RADIUS, 1, own.sigma_spatial, own.sigma_color, EVIDENCE_MIN_VARIANCE)
 }
 
 /// The window of a scale. At full size after coarser scales the planes are approximately known, and a smaller

@@ -46,7 +46,7 @@ pub(crate) struct Place {
 }
 
 /// What one cycle did to one view.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CycleRecord {
     /// Size of the images: 1 is full, 2 half, 4 a quarter.
     pub downscale: u32,
@@ -58,4 +58,7 @@ pub struct CycleRecord {
     pub changed: u64,
     /// Pixels validated by the check after it.
     pub validated: u64,
+    /// Median distance between where planes project to and where the source views' own depths lie, in px of
+    /// the cycle's scale: errors of the poses and of the matching. 0 before a check, or without planes.
+    pub median_residual: f64,
 }

@@ -15,6 +15,8 @@ pub struct ViewResult {
     pub raw: Maps,
     /// Mean `1 - NCC` of the raw plane over the pixel's view set, 0 to 2; lower is more certain.
     pub cost: Vec<f32>,
+    /// Probability that the raw depth is within 1 % of the true one, 0 to 1; 0 where there is none.
+    pub confidence: Vec<f32>,
     /// The status of each pixel: validated, or the reason why it is not.
     pub status: Vec<PixelStatus>,
     /// The view's source views, as indices into the scene; `view_sets` indexes this list.

@@ -4,7 +4,8 @@
 //! magic, version   8 bytes
 //! header           view, cycle, stage (0 searched, 1 checked), pixels, words of a view set, records: u64
 //! counts           ncc_evaluations, bilinear_samples, early_terminations: u64
-//! records          downscale, cycle, pixels, changed, validated: u64, one for each cycle so far
+//! records          downscale, cycle, pixels, changed, validated: u64, median residual: f64, one for each
+//!                  cycle so far
 //! pixels           depth, normal x y z, cost: f32; consistent views, validated: u8;
 //!                  view set: u32 words (searched only)
 //! ```
@@ -25,7 +26,7 @@ const MAGIC: [u8; 8] = *b"skepst\0\x02";
 /// Numbers of the header and the counts.
 const HEADER: usize = 9;
 /// Numbers of a record.
-const RECORD: usize = 5;
+const RECORD: usize = 6;
 /// Bytes of a pixel without its view set.
 const PIXEL: usize = 22;
 /// The codes of the stages in the header.
@@ -71,8 +72,9 @@ fn to_bytes<S>(estimate: &ViewEstimate<S>, stage: u64, view_sets: Option<&ViewSe
         put(&count.to_le_bytes());
     }
     for record in cycles {
-        let CycleRecord { downscale, cycle, pixels, changed, validated } = *record;
-        for number in [u64::from(downscale), u64::from(cycle), pixels, changed, validated] {
+        let CycleRecord { downscale, cycle, pixels, changed, validated, median_residual } = *record;
+        let median_residual = median_residual.to_bits();
+        for number in [u64::from(downscale), u64::from(cycle), pixels, changed, validated, median_residual] {
             put(&number.to_le_bytes());
         }
     }
@@ -201,15 +203,19 @@ impl Reader<'_> {
     }
 
     fn record(&mut self) -> Result<CycleRecord> {
-        let record = [(); RECORD].map(|()| self.u64().unwrap_or(0));
+        let record = [(); RECORD - 1].map(|()| self.u64().unwrap_or(0));
         // No scale has more pixels, so that sums of these never overflow.
         let most = u64::from(Camera::MAX_SIDE).pow(2);
         if record.iter().any(|&number| number > most) {
             return Err(error(format!("a cycle of {record:?}"), "numbers of pixels in an image"));
         }
+        let median_residual = self.take().map_or(0.0, f64::from_le_bytes);
+        if !(median_residual.is_finite() && median_residual >= 0.0) {
+            return Err(error(format!("a median residual of {median_residual}"), "a number of at least 0"));
+        }
         let [downscale, cycle, pixels, changed, validated] = record;
         let (downscale, cycle) = (downscale as u32, cycle as u32);
-        Ok(CycleRecord { downscale, cycle, pixels, changed, validated })
+        Ok(CycleRecord { downscale, cycle, pixels, changed, validated, median_residual })
     }
 
     /// A pixel's plane, `None` if its values are invalid. Only a check validates planes.

@@ -8,7 +8,7 @@ use super::result::ViewResult;
 use super::sources::{PublishedSurfaces, SourcePlanes};
 use super::status;
 use crate::ambc::{Candidate, ConfidenceTask, CostRules, Counts, Search, SearchResult, SearchRules, stream};
-use crate::cross_view::{self, ConsistencyCheck, ConsistencyRules, Donor, Target};
+use crate::cross_view::{self, ConsistencyCheck, DepthTolerance, Donor, Target};
 use crate::error::Result;
 use crate::fusion::{self, FusionView, PointCloud};
 use crate::geometry::ViewSets;
@@ -19,7 +19,7 @@ use crate::refine::Filter;
 use crate::refine::foreground_fattening::CorrectFattening;
 use crate::refine::gap_filling::FillGaps;
 use crate::refine::plane_smoothing::SmoothPlanes;
-use crate::refine::textureless::FillTextureless;
+use crate::refine::textureless::{FillTextureless, halos};
 use crate::scene::{PixelEstimate, PlaneMap, ScaledView, Scene, Verdict};
 use crate::view_selection::{ViewRules, select_sets};
 use rayon::prelude::*;
@@ -105,6 +105,18 @@ pub(super) struct SearchInput<'a> {
     pub is_guided: bool,
 }
 
+/// The options, tolerances of the depths of other views widened by the errors of the poses that the last check of a view found.
+fn widened(context: &RunContext, own: Option<&ViewEstimate<Checked>>) -> Options {
+    let mut options = context.options.clone();
+    let record = own.and_then(|own| own.cycles().last());
+    let widening =
+        record.map_or(1.0, |record| cross_view::widening(&options.check, record.median_residual as f32));
+    options.cost.geom_consistency_max_error *= f64::from(widening);
+    options.cost.geom_consistency_missing_error *= f64::from(widening);
+    options.view_selection.occlusion_tolerance *= f64::from(widening);
+    options
+}
+
 /// Searches the plane of every pixel (section 5 of the paper).
 pub(super) fn search(
     context: &RunContext,
@@ -116,6 +128,7 @@ pub(super) fn search(
     let SearchInput { own, candidates, is_guided } = input;
     let ScaledView { camera, mask, .. } = context.scaled(at);
     let cycle = &context.cycles()[at.cycle];
+    let options = widened(context, own);
     let found = if problem.sources.is_empty() {
         SearchResult::without_sources(camera.pixels())
     } else {
@@ -124,7 +137,8 @@ pub(super) fn search(
         let search = Search {
             problem,
             window: context.window(at.cycle),
-            rules: SearchRules::new(&context.options, &cycle.scale, cycle.cycle, is_guided),
+            evidence_window: context.evidence_window(),
+            rules: SearchRules::new(&options, &cycle.scale, cycle.cycle, is_guided),
             mask: mask.as_deref(),
             start: own.map(ViewEstimate::planes),
             candidates: candidates.as_deref(),
@@ -162,6 +176,14 @@ pub(super) fn fill_textureless(
         let filled = filter.apply(&context.filtered_view(searched.at), planes);
         let rules = SearchRules::new(&context.options, &cycle.scale, cycle.cycle, false).view_set;
         select_sets(problem, rules, &mut view_sets, &pixels_with_planes(&filled, planes));
+        if cycle.scale_index > 0 {
+            let has_no_evidence: Vec<bool> =
+                (0..planes.len()).map(|pixel| is_textureless[pixel] && view_sets.count(pixel) == 0).collect();
+            for pixel in halos(problem.image, &has_no_evidence) {
+                let words = view_sets.words_per_pixel();
+                view_sets.words_mut()[pixel as usize * words..][..words].fill(0);
+            }
+        }
     }
     // During a search `validated` marks planes that come from validated ones; the check sets it anew.
     planes.par_iter_mut().for_each(|plane| plane.validated = false);
@@ -190,6 +212,7 @@ pub(super) fn record_search(
         pixels: planes.par_iter().filter(|plane| plane.depth > 0.0).count() as u64,
         changed: planes.par_iter().enumerate().filter(has_changed).count() as u64,
         validated: 0,
+        median_residual: 0.0,
     };
     searched.cycles.push(record);
     searched
@@ -201,13 +224,15 @@ pub(super) fn check(
     own: &ViewEstimate<Searched>,
     sources: SourcePlanes<Searched>,
     advance: Advance,
-) -> Result<Vec<Verdict>> {
+) -> Result<(Vec<Verdict>, f32)> {
     let check = ConsistencyCheck {
         problem: &context.problem(own.at, PublishedSurfaces::none(context.sources(own.view()))),
         planes: own.planes(),
         view_sets: own.view_sets(),
         sources: sources.into_vec(),
-        rules: ConsistencyRules::new(&context.options.check),
+        options: &context.options.check,
+        window_radius: context.window(own.cycle()).radius() as f32,
+        is_recheck: false,
         level: context.level,
         advance,
     };
@@ -215,9 +240,15 @@ pub(super) fn check(
 }
 
 /// Writes the verdicts of a check into the checked planes.
-pub(super) fn apply_check(own: ViewEstimate<Searched>, verdicts: &[Verdict]) -> ViewEstimate<Unpublished> {
+pub(super) fn apply_check(
+    own: ViewEstimate<Searched>,
+    (verdicts, median_residual): &(Vec<Verdict>, f32),
+) -> ViewEstimate<Unpublished> {
     let (mut checked, _) = own.into_stage(Unpublished);
     checked.map.set_verdicts(verdicts);
+    if let Some(record) = checked.cycles.last_mut() {
+        record.median_residual = f64::from(*median_residual);
+    }
     checked
 }
 
@@ -250,6 +281,12 @@ pub(super) fn publish(context: &RunContext, own: ViewEstimate<Unpublished>) -> V
     checked
 }
 
+/// How far depths of the same surface may differ in the view after its last check.
+fn depth_tolerance(context: &RunContext, own: &ViewEstimate<Checked>) -> DepthTolerance {
+    let residual = own.cycles().last().map_or(0.0, |record| record.median_residual);
+    DepthTolerance::new(&context.options.check, residual as f32)
+}
+
 /// The planes of a view, the validated ones averaged with the published surfaces of its sources.
 pub(super) fn average_across_views(
     context: &RunContext,
@@ -257,7 +294,7 @@ pub(super) fn average_across_views(
     own: &ViewEstimate<Checked>,
 ) -> Vec<PixelEstimate> {
     match context.options.refine.cross_view_averaging {
-        true => cross_view::average(context.level, problem, own.planes()),
+        true => cross_view::average(context.level, problem, depth_tolerance(context, own), own.planes()),
         false => own.planes().to_vec(),
     }
 }
@@ -306,11 +343,13 @@ pub(super) fn recheck(
         planes: &planes,
         view_sets: &view_sets,
         sources: sources.into_vec(),
-        rules: ConsistencyRules::new(&context.options.check).for_recheck(),
+        options: &context.options.check,
+        window_radius: context.window(context.cycles().len() - 1).radius() as f32,
+        is_recheck: true,
         level: context.level,
         advance,
     };
-    let verdicts = check.run()?;
+    let (verdicts, _) = check.run()?;
     let confirmed = filled.0.into_iter().filter_map(|(pixel, plane)| {
         let (consistent_views, validated) = verdicts[pixel as usize];
         validated.then_some((pixel, PixelEstimate { consistent_views, validated, ..plane }))
@@ -318,16 +357,18 @@ pub(super) fn recheck(
     Ok(FilledGaps(confirmed.collect()))
 }
 
-/// Determines view set, cost (mean of 1 - NCC) and status of every pixel. Reads images and published surfaces
+/// Determines view set, cost (mean of 1 - NCC), confidence and status of every pixel; filled planes of pixels
+/// without texture are not validated. Reads images and published surfaces
 /// of the sources.
 pub(super) fn classify(
     context: &RunContext,
     problem: &Problem,
     own: ViewEstimate<Checked>,
-    planes: Vec<PixelEstimate>,
+    mut planes: Vec<PixelEstimate>,
+    filled: &FilledGaps,
     advance: Advance,
 ) -> Result<ViewResult> {
-    let confidence = ConfidenceTask {
+    let costs = ConfidenceTask {
         problem,
         window: context.window(own.cycle()),
         cost: CostRules::new(&context.options, false),
@@ -336,18 +377,25 @@ pub(super) fn classify(
         level: context.level,
         advance,
     };
-    let confidence = confidence.run(&planes)?;
+    let costs = costs.run(&planes)?;
+    // The edge of a sky is no gap: a filled plane needs texture of its own.
+    for &(pixel, _) in filled.0.iter().filter(|(pixel, _)| !costs.has_texture[*pixel as usize]) {
+        planes[pixel as usize].validated = false;
+    }
+    let tolerance = depth_tolerance(context, &own);
+    let confidence = cross_view::confidence(context.level, problem, tolerance, &planes, &costs.cost);
     let view = context.scaled(own.at);
-    let status = status::classify(view, &planes, &confidence, context.options.min_matched_views());
+    let status = status::classify(view, &planes, &costs, context.options.min_matched_views());
     let mut counts: Counts = own.counts;
-    counts += confidence.counts;
+    counts += costs.counts;
     Ok(ViewResult {
         width: view.camera.width,
         raw: maps_of(&planes),
         status,
-        cost: confidence.cost,
+        cost: costs.cost,
+        confidence,
         sources: context.sources(own.view()).to_vec(),
-        view_sets: confidence.view_sets,
+        view_sets: costs.view_sets,
         counts,
         cycles: own.cycles,
     })
@@ -367,6 +415,7 @@ pub(super) fn fuse(
             camera: &view.camera,
             maps: &result.raw,
             status: Some(&result.status),
+            confidence: Some(&result.confidence),
             picture: Some(&view.picture),
             overlap,
         })

@@ -207,8 +207,9 @@ impl Stepper {
         let filled = stages::fill_gaps(&self.0, at, &planes);
         let known = |view: usize| estimates.get(view).copied().flatten().map(ViewEstimate::planes);
         let sources = SourcePlanes::new(self.sources(view), known);
-        stages::recheck(&self.0, &problem, filled, sources, &advance)?.write_to(&mut planes);
-        stages::classify(&self.0, &problem, own.clone(), planes, &advance)
+        let filled = stages::recheck(&self.0, &problem, filled, sources, &advance)?;
+        filled.write_to(&mut planes);
+        stages::classify(&self.0, &problem, own.clone(), planes, &filled, &advance)
     }
 
     /// Fuses the validated pixels of the results of all views into points.

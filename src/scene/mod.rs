@@ -1,6 +1,7 @@
 //! The input of a run: views with image, camera, mask and depth range, and sparse points.
 
 mod compact_plane;
+mod depth_ranges;
 mod maps;
 mod plane_map;
 mod scaled_view;
@@ -9,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::geometry::{Camera, DepthRange};
 use crate::image::Picture;
 pub(crate) use compact_plane::CompactPlane;
+use depth_ranges::{DepthRanges, depth_ranges};
 use glam::DVec3;
 pub use maps::{Maps, PixelStatus};
 pub(crate) use plane_map::{PixelEstimate, PlaneMap, Verdict, validated_planes};
@@ -48,16 +50,20 @@ pub struct Scene {
     views: Vec<View>,
     points: Vec<SparsePoint>,
     depth_ranges: Vec<DepthRange>,
+    warnings: Vec<String>,
 }
 
 impl Scene {
     /// Checks every view and point and determines the depth range of each view: its own, else from three
-    /// quarters of the 1st to twice the 99th percentile of the depths of the sparse points it saw.
+    /// quarters of the 1st to twice the 99th percentile of the depths of the sparse points it saw. A view
+    /// that saw none takes those that project into its image, whichever views saw them; where there are none
+    /// either, the smallest to the largest depth of the other views' ranges. [`Scene::warnings`] names it.
     ///
     /// # Errors
     /// Fewer than two views; a name that occurs twice; a picture or mask of another size than its camera; an
     /// invalid camera, range or point; a point or source list with an index that is no view; a source list
-    /// with the view itself or a view twice; a view with neither range nor sparse points.
+    /// with the view itself or a view twice; a view without range where there are no sparse points, or
+    /// where no view has a range.
     pub fn new(views: Vec<View>, points: Vec<SparsePoint>) -> Result<Scene> {
         if views.len() < 2 {
             return Err(Error::argument("views", views.len(), "at least 2 views"));
@@ -81,13 +87,8 @@ impl Scene {
                 return Err(Error::argument(format!("points[{index}].views"), view, expected));
             }
         }
-        let depth_ranges = (0..views.len())
-            .map(|view| match views[view].depth_range {
-                Some(range) => Ok(range),
-                None => range_of_points(&views, view, &points),
-            })
-            .collect::<Result<_>>()?;
-        Ok(Scene { views, points, depth_ranges })
+        let DepthRanges { ranges: depth_ranges, warnings } = depth_ranges(&views, &points)?;
+        Ok(Scene { views, points, depth_ranges, warnings })
     }
 
     /// Returns the views and points, to change them.
@@ -108,6 +109,12 @@ impl Scene {
     /// The depth range of one view.
     pub fn depth_range(&self, view: usize) -> DepthRange {
         self.depth_ranges[view]
+    }
+
+    /// A sentence for each view whose depth range is neither its own nor that of sparse points it saw, and so
+    /// may miss surfaces; a single sentence for all views where no point names a view.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 }
 
@@ -149,35 +156,4 @@ fn check_sources(name: &str, view: usize, sources: &[u32], views: usize) -> Resu
         }
     }
     Ok(())
-}
-
-/// Percentiles of the depths of sparse points that bound a view's range: outliers of the triangulation lie
-/// beyond.
-const RANGE_PERCENTILES: (f64, f64) = (0.01, 0.99);
-/// Surfaces without features may lie in front of and behind all points. The search is uniform in inverse
-/// depth: doubling the largest depth adds little to it.
-const RANGE_WIDENING: (f64, f64) = (0.75, 2.0);
-
-fn range_of_points(views: &[View], view: usize, points: &[SparsePoint]) -> Result<DepthRange> {
-    let depth = |point: &SparsePoint| views[view].camera.to_camera(point.position).z;
-    let mut depths: Vec<f64> = points
-        .iter()
-        .filter(|point| point.views.contains(&(view as u32)))
-        .map(depth)
-        .filter(|&depth| depth > 0.0)
-        .collect();
-    if depths.is_empty() {
-        return Err(Error::argument(
-            format!("depth range of {}", views[view].name),
-            "unknown",
-            "sparse points that this view saw, or a depth range (--depth-range MIN MAX)",
-        ));
-    }
-    depths.sort_by(f64::total_cmp);
-    let percentile = |share: f64| depths[((depths.len() - 1) as f64 * share).round() as usize];
-    let range = DepthRange {
-        near: percentile(RANGE_PERCENTILES.0) * RANGE_WIDENING.0,
-        far: percentile(RANGE_PERCENTILES.1) * RANGE_WIDENING.1,
-    };
-    range.check(&format!("depth range of {} from its sparse points", views[view].name)).map(|()| range)
 }

@@ -25,6 +25,13 @@ const MIN_SHARED_POINTS: usize = 3;
 const ANGLE_QUANTILE: f64 = 0.75;
 /// Number of source views taken from outside the range when none lies in it: validation needs at least two.
 const FALLBACK_SOURCES: usize = 2;
+/// The angle of the most useful source view, in degrees, and the spread of the logarithms of useful ones.
+const BEST_ANGLE: f64 = 10.0;
+const ANGLE_SPREAD: f64 = 0.8;
+/// Angle between two source views, seen from the surface, in degrees, from which on they add to each other.
+const SAME_DIRECTION: f64 = 2.0;
+/// Largest ratio of an angle outside the range to the nearest one in it, of source views that are added.
+const MAX_DISTANCE: f64 = 4.0;
 /// Columns and rows of the points that stand for an image when there are no shared points, as fractions of
 /// its sides.
 const GRID_FRACTIONS: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
@@ -40,25 +47,16 @@ pub(crate) fn source_lists(scene: &Scene, options: &Options) -> SourceLists {
             lists.add(view, sources.clone(), options);
             continue;
         }
-        let mut angles: Vec<(f64, u32)> = (0..scene.views().len())
+        let pairs: Vec<Pair> = (0..scene.views().len())
             .filter(|&other| other != index)
-            .filter_map(|other| Some((angle_of_pair(scene, &shared, index, other)?, other as u32)))
+            .filter_map(|other| Pair::new(scene, &shared, index, other))
             .collect();
-        angles.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let (min, max) =
-            (options.view_selection.min_triangulation_angle, options.view_selection.max_triangulation_angle);
-        let is_in_range = |angle: f64| (min..=max).contains(&angle);
-        let mut list: Vec<u32> = angles.iter().filter(|a| is_in_range(a.0)).map(|a| a.1).collect();
-        if list.is_empty() {
-            let distance = |angle: f64| (min - angle).max(angle - max);
-            angles.sort_by(|a, b| distance(a.0).total_cmp(&distance(b.0)).then(a.1.cmp(&b.1)));
-            angles.truncate(FALLBACK_SOURCES);
-            lists.warnings.push(describe_fallback(&view.name, &angles, options));
-            list = angles.iter().map(|a| a.1).collect();
+        let list = select(scene, index, pairs, options);
+        let inside = list.iter().filter(|pair| pair.is_inside(options)).count();
+        if inside < list.len().min(2) || list.is_empty() {
+            lists.warnings.push(describe_fallback(&view.name, &list, options));
         }
-        if options.view_selection.max_sources > 0 {
-            list.truncate(options.view_selection.max_sources as usize);
-        }
+        let list = list.iter().map(|pair| pair.source).collect();
         lists.add(view, list, options);
     }
     lists
@@ -94,13 +92,90 @@ impl SourceLists {
     }
 }
 
-fn describe_fallback(name: &str, fallback: &[(f64, u32)], options: &Options) -> String {
+/// A reference view and a possible source view.
+#[derive(Debug, Clone, Copy)]
+struct Pair {
+    source: u32,
+    /// Triangulation angle in degrees.
+    angle: f64,
+}
+
+impl Pair {
+    fn new(scene: &Scene, shared: &SharedAngles, reference: usize, source: usize) -> Option<Pair> {
+        let angle = angle_of_pair(scene, shared, reference, source)?;
+        Some(Pair { source: source as u32, angle })
+    }
+
+    fn is_inside(&self, options: &Options) -> bool {
+        self.distance(options) <= 1.0
+    }
+
+    /// The ratio of the angle to the nearest one in the range of the options.
+    fn distance(&self, options: &Options) -> f64 {
+        let options = &options.view_selection;
+        (options.min_triangulation_angle / self.angle)
+            .max(self.angle / options.max_triangulation_angle)
+            .max(1.0)
+    }
+
+    /// How useful the source view is beside no other one.
+    fn weight(&self) -> f64 {
+        let ratio = (self.angle / BEST_ANGLE).ln() / ANGLE_SPREAD;
+        (-0.5 * ratio * ratio).exp()
+    }
+}
+
+/// The pairs whose source views are taken: those in the range of the options and, where these are too few, the
+/// nearest outside; of too many, those that are the most useful beside each other. Inside before outside, then
+/// by angle.
+fn select(scene: &Scene, reference: usize, mut pairs: Vec<Pair>, options: &Options) -> Vec<Pair> {
+    let rules = &options.view_selection;
+    pairs.sort_by(|a, b| {
+        let by_distance = a.distance(options).total_cmp(&b.distance(options));
+        by_distance.then(a.angle.total_cmp(&b.angle)).then(a.source.cmp(&b.source))
+    });
+    let inside = pairs.iter().filter(|pair| pair.is_inside(options)).count();
+    let most = if rules.max_sources == 0 { usize::MAX } else { rules.max_sources as usize };
+    if inside <= most {
+        let near = pairs.iter().filter(|pair| pair.distance(options) <= MAX_DISTANCE).count();
+        let wanted = near.min(rules.min_sources as usize);
+        let least = if inside == 0 { FALLBACK_SOURCES } else { inside };
+        pairs.truncate(wanted.max(least).min(most));
+        return pairs;
+    }
+    pairs.truncate(inside);
+    let camera = &scene.views()[reference].camera;
+    let range = scene.depth_range(reference);
+    let center = camera.unproject(
+        DVec2::new(f64::from(camera.width), f64::from(camera.height)) * 0.5,
+        (range.near * range.far).sqrt(),
+    );
+    let direction = |pair: &Pair| scene.views()[pair.source as usize].camera.center() - center;
+    let mut gains: Vec<f64> = pairs.iter().map(Pair::weight).collect();
+    let mut selected = Vec::new();
+    while selected.len() < most {
+        let best = (0..pairs.len())
+            .rev()
+            .max_by(|&a, &b| gains[a].total_cmp(&gains[b]))
+            .expect("more pairs than are selected");
+        selected.push(best);
+        gains[best] = -1.0;
+        for (gain, pair) in gains.iter_mut().zip(&pairs) {
+            let apart = direction(pair).angle_between(direction(&pairs[best])).to_degrees() / SAME_DIRECTION;
+            *gain *= 1.0 - (-0.5 * apart * apart).exp();
+        }
+    }
+    selected.sort_unstable();
+    selected.into_iter().map(|place| pairs[place]).collect()
+}
+
+fn describe_fallback(name: &str, fallback: &[Pair], options: &Options) -> String {
     let (min, max) =
         (options.view_selection.min_triangulation_angle, options.view_selection.max_triangulation_angle);
     if fallback.is_empty() {
         return format!("{name} overlaps with no other view: no depth can be estimated for it");
     }
-    let angles: Vec<String> = fallback.iter().map(|(angle, _)| format!("{angle:.1}")).collect();
+    let angles: Vec<String> = fallback.iter().map(|pair| format!("{:.1}", pair.angle)).collect();
     format!(
         "{name} has no source view with a triangulation angle of {min} to {max} degrees; those with the \
          nearest angles are used: {} degrees",

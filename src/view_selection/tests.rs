@@ -187,6 +187,7 @@ fn ten_to_thirty() -> Options {
     changed(Options::default(), |o| {
         o.view_selection.min_triangulation_angle = 10.0;
         o.view_selection.max_triangulation_angle = 30.0;
+        o.view_selection.min_sources = 0;
         o.view_selection.max_sources = 0;
         o.check.min_consistent_views = 1;
     })

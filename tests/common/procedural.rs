@@ -13,6 +13,8 @@ pub enum Texture {
     Noise,
     /// One gray value everywhere.
     Uniform,
+    /// Brighter upwards, a gray value every four world units: a sky.
+    Gradient,
 }
 
 /// The shape of a surface.
@@ -198,7 +200,7 @@ impl Procedural {
             for row in (view % POINT_STEP..camera.height as usize).step_by(POINT_STEP) {
                 for column in (view % POINT_STEP..camera.width as usize).step_by(POINT_STEP) {
                     let Some(hit) = self.hit(view, row * camera.width as usize + column) else { continue };
-                    if self.surfaces[hit.surface].texture == Texture::Uniform {
+                    if self.surfaces[hit.surface].texture != Texture::Noise {
                         continue;
                     }
                     let seen = (0..self.views.len()).filter(|&other| self.is_visible(hit.position, other));
@@ -316,6 +318,7 @@ fn render(surfaces: &[Surface], camera: &Camera) -> Picture {
 fn color_of(surfaces: &[Surface], hit: &Hit) -> DVec3 {
     match surfaces[hit.surface].texture {
         Texture::Uniform => DVec3::splat(0.5),
+        Texture::Gradient => DVec3::splat(0.85 - 0.001 * hit.position.y),
         Texture::Noise => {
             let value = noise(hit.position);
             DVec3::new(value, 0.9 * value + 0.05, 0.8 * value + 0.1)

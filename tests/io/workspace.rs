@@ -18,6 +18,7 @@ fn result() -> ViewResult {
         width: 6,
         raw: Maps { depth: vec![0.0; 24], normal: vec![[0.0; 3]; 24] },
         cost: vec![0.0; 24],
+        confidence: vec![0.5; 24],
         status: vec![PixelStatus::Masked; 24],
         sources: vec![5, 2],
         view_sets: ViewSets::empty(24, 2),
@@ -57,6 +58,8 @@ fn a_view_is_written_as_colmap_lays_it_out() {
         "preview/cam 1/right side.png.depth.png",
         "preview/cam 1/right side.png.normal.png",
         "preview/cam 1/right side.png.views.png",
+        "preview/cam 1/right side.png.confidence.png",
+        "stereo/confidence_maps/cam 1/right side.png.geometric.bin",
     ] {
         assert!(workspace.folder().join(file).is_file(), "{file}");
     }

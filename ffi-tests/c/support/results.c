@@ -15,10 +15,12 @@ view_maps maps_of(const skep_result *result, uint32_t view) {
         REQUIRE(skep_result_get_normal(result, view, which, maps.normal[which], 12 * width));
     }
     maps.cost = take(pixels, sizeof *maps.cost);
+    maps.confidence = take(pixels, sizeof *maps.confidence);
     maps.status = take(pixels, sizeof *maps.status);
     maps.source_count = take(pixels, sizeof *maps.source_count);
     maps.source_bits = take(pixels, sizeof *maps.source_bits);
     REQUIRE(skep_result_get_cost(result, view, maps.cost, 4 * width));
+    REQUIRE(skep_result_get_confidence(result, view, maps.confidence, 4 * width));
     REQUIRE(skep_result_get_status(result, view, maps.status, width));
     REQUIRE(skep_result_get_source_count(result, view, maps.source_count, 2 * width));
     REQUIRE(skep_result_get_source_bits(result, view, 0, maps.source_bits, 4 * width));
@@ -34,6 +36,7 @@ void maps_free(view_maps *maps) {
         free(maps->normal[which]);
     }
     free(maps->cost);
+    free(maps->confidence);
     free(maps->status);
     free(maps->source_count);
     free(maps->source_bits);
@@ -60,6 +63,7 @@ void check_same_maps(const view_maps *a, const view_maps *b, const char *what) {
               which);
     }
     CHECK(same_bytes(a->cost, b->cost, 4 * pixels), "%s", what);
+    CHECK(same_bytes(a->confidence, b->confidence, 4 * pixels), "%s", what);
     CHECK(same_bytes(a->status, b->status, pixels), "%s", what);
     CHECK(same_bytes(a->source_count, b->source_count, 2 * pixels), "%s", what);
     CHECK(same_bytes(a->source_bits, b->source_bits, 4 * pixels), "%s", what);

@@ -11,6 +11,7 @@ typedef struct view_maps {
     float *depth[2];
     float *normal[2];
     float *cost;
+    float *confidence;
     uint8_t *status;
     uint16_t *source_count;
     uint32_t *source_bits;

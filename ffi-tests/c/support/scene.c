@@ -285,7 +285,11 @@ skep_options *quick_options(void) {
                                   "downscale=2 food_sources=4 iterations=5+1x1; "
                                   "downscale=1 food_sources=3 iterations=1+1x1"));
     REQUIRE(skep_options_set(options, "threads", 2));
-    REQUIRE(skep_options_set(options, "fusion.min_views", 2));
+    REQUIRE(skep_options_set(options, "fusion.min_agreeing_views", 2));
+    /* Three views see every point, and small images make a pixel much depth. */
+    REQUIRE(skep_options_set(options, "min_agreeing_fraction", 0));
+    REQUIRE(skep_options_set(options, "few_views", 0));
+    REQUIRE(skep_options_set(options, "check.reprojection_tolerance", 0));
     if (scene_is_small()) {
         /* All of it is edge. */
         REQUIRE(skep_options_set(options, "fattening_passes", 0));

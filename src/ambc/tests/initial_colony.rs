@@ -43,6 +43,7 @@ fn near_estimate(is_known: bool, validated: bool, with_candidate: bool) -> [usiz
         let search = Search {
             problem: &problem,
             window: &window,
+            evidence_window: &window,
             rules: SearchRules::new(&options, &scale, 0, false),
             mask: None,
             start: is_known.then_some(&starts[..]),

@@ -24,6 +24,7 @@ fn search<'a>(problem: &'a Problem<'a>, window: &'a Window, rules: SearchRules) 
     Search {
         problem,
         window,
+        evidence_window: window,
         rules,
         mask: None,
         start: None,

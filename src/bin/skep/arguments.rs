@@ -1,7 +1,7 @@
 //! The arguments of the command line, and their help.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use skep::{DepthRange, Options, Result};
+use skep::{DepthRange, FusionOptions, Options, Result};
 use std::path::PathBuf;
 
 #[derive(Parser)]
@@ -50,6 +50,9 @@ pub struct Reconstruct {
     /// repeated
     #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
     set: Vec<(String, String)>,
+    /// Leave pixels of a smaller confidence, 0 to 1, out of the cloud
+    #[arg(long, value_name = "C")]
+    min_confidence: Option<f64>,
     /// Scales to search instead of the preset's, from coarse to fine, the last at full size, such as
     /// 'downscale=2 food_sources=3 iterations=5+4x1; downscale=1 food_sources=2 iterations=1+2x1': half size
     /// with 3 food sources a pixel, 5 iterations in the first cycle and 4 more cycles of 1, then full size
@@ -96,6 +99,13 @@ pub struct Fuse {
     /// File of the cloud [default: WORKSPACE/fused.ply]
     #[arg(short, long, value_name = "FILE.ply")]
     output: Option<PathBuf>,
+    /// Set an option of the fusion; `skep info` lists those of the group fusion, `skep info NAME` explains
+    /// one. May be repeated
+    #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
+    set: Vec<(String, String)>,
+    /// Leave pixels of a smaller confidence, 0 to 1, out of the cloud; only maps of skep have confidences
+    #[arg(long, value_name = "C")]
+    min_confidence: Option<f64>,
     /// Print warnings and errors only
     #[arg(short, long)]
     pub quiet: bool,
@@ -122,6 +132,9 @@ impl Reconstruct {
         for (name, value) in &self.set {
             options.set(name, value)?;
         }
+        if let Some(least) = self.min_confidence {
+            options.fusion.min_confidence = least;
+        }
         if let Some(scales) = &self.schedule {
             options.set("schedule.scales", scales)?;
         }
@@ -138,6 +151,19 @@ impl Reconstruct {
 }
 
 impl Fuse {
+    /// The options of the fusion.
+    pub fn options(&self) -> Result<FusionOptions> {
+        let mut options = Options::default();
+        for (name, value) in &self.set {
+            options.set(name, value)?;
+        }
+        if let Some(least) = self.min_confidence {
+            options.fusion.min_confidence = least;
+        }
+        options.check()?;
+        Ok(options.fusion)
+    }
+
     /// The file of the cloud.
     pub fn output(&self) -> PathBuf {
         self.output.clone().unwrap_or_else(|| self.workspace.join("fused.ply"))
@@ -166,10 +192,12 @@ Results, in COLMAP's layouts:
   fused.ply.vis                    the views each point was fused from
   preview/NAME.depth.png           previews: depth, normal and number of source views of
           NAME.normal.png          each pixel; black where no plane was validated
-          NAME.views.png
+          NAME.views.png           and its confidence, white for 1
+          NAME.confidence.png
   stereo/depth_maps/NAME.photometric.bin    the raw estimate of every pixel
   stereo/depth_maps/NAME.geometric.bin      the validated pixels only
   stereo/normal_maps, stereo/consistency_graphs    likewise: normals, and the view set of each pixel
+  stereo/confidence_maps           likewise, as depth maps: the probability of each depth to be within 1 %
   images, sparse                   copy of the scene, for COLMAP: the folder is a workspace
                                    of `colmap stereo_fusion --workspace_path DIR ...`
   report.json                      counts, times and options; written last

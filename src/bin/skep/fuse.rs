@@ -6,7 +6,7 @@ use crate::progress::Display;
 use crate::{Failure, streams};
 use skep::fusion::{FusionView, fuse, overlaps};
 use skep::io::{SceneFolder, Workspace, WorkspaceMaps};
-use skep::{Error, Options, PointCloud, Progress};
+use skep::{Error, FusionOptions, PointCloud, Progress};
 
 /// Runs the command.
 pub fn run(arguments: &Fuse) -> Result<(), Failure> {
@@ -29,7 +29,8 @@ pub fn run(arguments: &Fuse) -> Result<(), Failure> {
 
     let interrupt = Interrupt::watch();
     let output = arguments.output();
-    let cloud = fuse_maps(&maps, display, &interrupt).inspect_err(|error| {
+    let options = arguments.options().map_err(Failure::Usage)?;
+    let cloud = fuse_maps(&maps, &options, display, &interrupt).inspect_err(|error| {
         if *error == Error::Cancelled {
             streams::notice(&format!("interrupted: {} was not written", output.display()));
         }
@@ -43,7 +44,12 @@ pub fn run(arguments: &Fuse) -> Result<(), Failure> {
     Ok(())
 }
 
-fn fuse_maps(maps: &WorkspaceMaps, display: Display, interrupt: &Interrupt) -> skep::Result<PointCloud> {
+fn fuse_maps(
+    maps: &WorkspaceMaps,
+    options: &FusionOptions,
+    display: Display,
+    interrupt: &Interrupt,
+) -> skep::Result<PointCloud> {
     let overlaps = overlaps(maps.views.len(), &maps.points);
     let views: Vec<FusionView> = maps
         .views
@@ -53,6 +59,7 @@ fn fuse_maps(maps: &WorkspaceMaps, display: Display, interrupt: &Interrupt) -> s
             camera: &view.camera,
             maps: &view.maps,
             status: None,
+            confidence: view.confidence.as_deref(),
             picture: view.picture.as_ref(),
             overlap,
         })
@@ -62,7 +69,7 @@ fn fuse_maps(maps: &WorkspaceMaps, display: Display, interrupt: &Interrupt) -> s
         reporter.show(progress);
         interrupt.control_flow()
     };
-    let cloud = fuse(&views, &Options::default().fusion, &progress)?;
+    let cloud = fuse(&views, options, &progress)?;
     interrupt.check().map(|()| cloud)
 }
 
@@ -75,10 +82,11 @@ fn summary(maps: &WorkspaceMaps, cloud: &PointCloud) -> Vec<String> {
     let kind = maps.kind.colmap_name();
     let mut lines = vec![format!("{estimated} depths of {pixels} pixels in the {kind} maps")];
     if cloud.positions.is_empty() {
-        let others = Options::default().fusion.min_views;
         lines.push(match estimated {
             0 => "the cloud is empty because no map holds a depth".to_owned(),
-            _ => format!("the cloud is empty because no depth is confirmed by {others} other views"),
+            _ => "the cloud is empty because too few other views confirm the depths; `skep info \
+                  min_agreeing_views` explains how many must"
+                .to_owned(),
         });
     }
     lines

@@ -9,10 +9,17 @@ use crate::stopwatch::{Stage, Stopwatch};
 use crate::{Failure, streams};
 use rayon::prelude::*;
 use skep::io::{SceneFolder, Workspace, read_scene};
-use skep::{Error, PixelStatus, Progress, ProgressFn, Reconstruction, Result, Scene};
+use skep::{DepthRange, Error, Options, PixelStatus, Progress, ProgressFn, Reconstruction, Result, Scene};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
+
+/// Points for each unmasked pixel below which a cloud is thin. A point takes the pixel of every view that
+/// agrees: 0.03 to 0.2 are usual, and 0.01 is left of a complete cloud that 100 views see everywhere.
+const THIN_CLOUD: f64 = 0.01;
+/// Percentage of the pixels above which a status is named as a reason of an empty cloud; the two largest at
+/// most. One of the six statuses always has more.
+const LARGE_SHARE: f64 = 10.0;
 
 /// Runs the command.
 pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
@@ -25,6 +32,7 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
     let display = Display::new(arguments.quiet);
     display.print(&format!("reading {}", arguments.scene.display()));
     let scene = read_scene(&arguments.scene, depth_range)?;
+    scene.warnings().iter().for_each(|warning| streams::warning(warning));
     require_writable(&output)?;
     if let Some(folder) = &arguments.dump {
         require_writable(folder)?;
@@ -49,13 +57,17 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
     stopwatch.enter(Stage::Writing);
     display.print(&format!("writing {}", output.display()));
     let mut report = Report::new(&scene, &arguments.preset, &options, &result);
+    let ranges: Vec<DepthRange> = (0..scene.views().len()).map(|view| scene.depth_range(view)).collect();
+    let empty = (report.totals.points == 0).then(|| empty_cloud(&report.totals, &ranges, &options));
+    report.warnings.extend(empty.clone());
     let writers = pool(options.threads)?;
     writers.install(|| write(&output, &arguments.scene, &scene, &result, &interrupt))?;
     report.set_times(stopwatch.times());
     report.write(&report_path(&output))?;
 
+    empty.iter().for_each(|warning| streams::warning(warning));
     if !arguments.quiet {
-        summary(&output, &scene, &report.totals).iter().for_each(|line| streams::result(line));
+        summary(&output, &scene, &ranges, &report.totals).iter().for_each(|line| streams::result(line));
     }
     Ok(())
 }
@@ -142,17 +154,15 @@ fn explain_interruption(error: &Error, kept: &str) {
     }
 }
 
-/// The last lines: the written files and, if the cloud is empty, the reasons.
-fn summary(output: &Path, scene: &Scene, totals: &Totals) -> Vec<String> {
+/// The last lines: the written files and, if the cloud is empty or thin, the reasons.
+fn summary(output: &Path, scene: &Scene, ranges: &[DepthRange], totals: &Totals) -> Vec<String> {
     let workspace = Workspace::new(output);
     let validated = share(totals, PixelStatus::Validated);
     let mut lines = vec![
         format!("{} views, {validated:.1} % of {} pixels validated", scene.views().len(), totals.pixels),
         format!("{} points in {}", totals.points, workspace.cloud().display()),
     ];
-    if totals.points == 0 {
-        lines.extend(reasons(totals));
-    }
+    lines.extend(reasons(totals, ranges));
     let first = &scene.views()[0].name;
     lines.push(format!("previews such as {}", workspace.preview(first, "depth").display()));
     lines.push(format!("maps in {}", output.join("stereo").display()));
@@ -161,24 +171,66 @@ fn summary(output: &Path, scene: &Scene, totals: &Totals) -> Vec<String> {
     lines
 }
 
-/// Why the cloud is empty: the number of pixels of each status, and the remedy.
-fn reasons(totals: &Totals) -> Vec<String> {
-    let help = |status| match status {
+/// Why the cloud is empty or thin: the number of pixels of each status with the remedy, and the depth range.
+/// Nothing for other clouds.
+fn reasons(totals: &Totals, ranges: &[DepthRange]) -> Vec<String> {
+    let unmasked = totals.pixels - totals.status_counts[PixelStatus::Masked.name()];
+    let cloud = match totals.points {
+        0 => "empty",
+        points if (points as f64) < THIN_CLOUD * unmasked as f64 => "thin",
+        _ => return Vec::new(),
+    };
+    let mut lines = vec![format!("the cloud is {cloud}; the status of the pixels:")];
+    for status in PixelStatus::ALL.into_iter().filter(|status| totals.status_counts[status.name()] > 0) {
+        let (name, share) = (status.name(), share(totals, status));
+        lines.push(format!("  {} ({share:.1} %) {name}: {}", totals.status_counts[name], help(status)));
+    }
+    lines.push(format!("{}; --depth-range MIN MAX sets another range", searched(ranges)));
+    lines
+}
+
+/// One sentence on an empty cloud, with the most frequent statuses of the pixels and the remedy.
+fn empty_cloud(totals: &Totals, ranges: &[DepthRange], options: &Options) -> String {
+    let mut statuses = PixelStatus::ALL;
+    statuses.sort_by_key(|status| std::cmp::Reverse(totals.status_counts[status.name()]));
+    let large = statuses.into_iter().filter(|&status| share(totals, status) > LARGE_SHARE);
+    let large = large.take(2).map(|status| {
+        let (name, share) = (status.name(), share(totals, status));
+        format!("{share:.1} % of the pixels are {name} ({})", help(status))
+    });
+    let reasons: Vec<String> = large.collect();
+    let mut text = format!("the cloud is empty: {}; {}", reasons.join(", "), searched(ranges));
+    let others = ranges.len() - 1;
+    if others < options.check.min_consistent_views as usize {
+        text += &format!(
+            "; {} views cannot confirm a depth in {} other ones: --set check.min_consistent_views={others}",
+            ranges.len(),
+            options.check.min_consistent_views
+        );
+    }
+    text
+}
+
+/// What a status says about the scene, and the remedy.
+fn help(status: PixelStatus) -> &'static str {
+    match status {
         PixelStatus::Validated => {
             "validated, but confirmed by fewer views than fusion needs: more views of each surface"
         }
         PixelStatus::Masked => "excluded by a mask",
         PixelStatus::NoTexture => "too uniform to be matched: more texture or more light",
-        PixelStatus::NoSources => "seen by fewer than two other views: more overlap between photographs",
+        PixelStatus::NoSources => "seen by too few other views: more overlap between photographs",
         PixelStatus::Inconsistent => "other views disagree: check the calibration and that nothing moved",
         PixelStatus::OutOfRange => "at an end of the depth range: widen it with --depth-range MIN MAX",
-    };
-    let mut lines = vec!["the cloud is empty; the status of the pixels:".to_owned()];
-    for status in PixelStatus::ALL.into_iter().filter(|status| totals.status_counts[status.name()] > 0) {
-        let (name, share) = (status.name(), share(totals, status));
-        lines.push(format!("  {} ({share:.1} %) {name}: {}", totals.status_counts[name], help(status)));
     }
-    lines
+}
+
+/// The depths that were searched, over all views, with the four significant digits that a message needs.
+fn searched(ranges: &[DepthRange]) -> String {
+    let rounded = |depth: f64| format!("{depth:.3e}").parse().unwrap_or(depth);
+    let near = ranges.iter().map(|range| range.near).fold(f64::INFINITY, f64::min);
+    let far = ranges.iter().map(|range| range.far).fold(0.0, f64::max);
+    format!("depths of {} to {} were searched", rounded(near), rounded(far))
 }
 
 /// Percentage of the pixels with this status.
@@ -190,13 +242,51 @@ fn share(totals: &Totals, status: PixelStatus) -> f64 {
 mod tests {
     use super::*;
 
+    const RANGES: [DepthRange; 2] =
+        [DepthRange { near: 1.25, far: 4.0 }, DepthRange { near: 1.5, far: 4.133_94 }];
+
+    /// Totals of 1000 pixels with these statuses, in the order of [`PixelStatus::ALL`].
+    fn totals(points: usize, counts: [u64; 6]) -> Totals {
+        let status_counts = PixelStatus::ALL.iter().map(|status| status.name()).zip(counts).collect();
+        Totals { pixels: 1000, points, status_counts, ..Totals::default() }
+    }
+
     #[test]
     fn an_empty_cloud_is_explained_by_the_reasons_that_occurred() {
-        let counts = [0, 0, 300, 0, 700, 0];
-        let status_counts = PixelStatus::ALL.iter().map(|status| status.name()).zip(counts).collect();
-        let lines = reasons(&Totals { pixels: 1000, status_counts, ..Totals::default() });
-        assert_eq!(lines.len(), 3, "{lines:?}");
+        let lines = reasons(&totals(0, [0, 0, 300, 0, 700, 0]), &RANGES);
+        assert_eq!(lines.len(), 4, "{lines:?}");
+        assert_eq!(lines[0], "the cloud is empty; the status of the pixels:");
         assert!(lines[1].starts_with("  300 (30.0 %) no_texture: "), "{}", lines[1]);
         assert!(lines[2].starts_with("  700 (70.0 %) inconsistent: "), "{}", lines[2]);
+        assert!(
+            lines[3].starts_with("depths of 1.25 to 4.134 were searched; --depth-range "),
+            "{}",
+            lines[3]
+        );
+    }
+
+    #[test]
+    fn a_thin_cloud_is_explained_as_well_and_measured_by_the_unmasked_pixels() {
+        let thin = reasons(&totals(9, [400, 0, 0, 600, 0, 0]), &RANGES);
+        assert_eq!(thin[0], "the cloud is thin; the status of the pixels:");
+        assert!(thin[2].starts_with("  600 (60.0 %) no_sources: seen by too few other views"), "{}", thin[2]);
+        assert_eq!(reasons(&totals(10, [400, 0, 0, 600, 0, 0]), &RANGES), Vec::<String>::new());
+        assert_eq!(reasons(&totals(9, [100, 900, 0, 0, 0, 0]), &RANGES), Vec::<String>::new());
+    }
+
+    #[test]
+    fn the_warning_of_an_empty_cloud_names_the_largest_reasons_and_the_remedy() {
+        let options = Options::default();
+        let counts = totals(0, [0, 0, 250, 90, 660, 0]);
+        let warning = empty_cloud(&counts, &[RANGES[0], RANGES[1], RANGES[1]], &options);
+        let start = "the cloud is empty: 66.0 % of the pixels are inconsistent (other views disagree: ";
+        assert!(warning.starts_with(start), "{warning}");
+        assert!(warning.contains(", 25.0 % of the pixels are no_texture (too uniform "), "{warning}");
+        assert!(!warning.contains("no_sources"), "{warning}");
+        assert!(warning.ends_with("; depths of 1.25 to 4.134 were searched"), "{warning}");
+
+        let two_views = empty_cloud(&totals(0, [0, 0, 0, 1000, 0, 0]), &RANGES, &options);
+        assert!(two_views.contains("100.0 % of the pixels are no_sources"), "{two_views}");
+        assert!(two_views.ends_with("--set check.min_consistent_views=1"), "{two_views}");
     }
 }

@@ -21,7 +21,8 @@ pub struct Report {
     threads: usize,
     preset: String,
     options: BTreeMap<&'static str, Value>,
-    warnings: Vec<String>,
+    /// Of the scene, then of the run.
+    pub warnings: Vec<String>,
     pub totals: Totals,
     phases: Times,
     views: Vec<ViewReport>,
@@ -83,7 +84,7 @@ impl Report {
             threads: if options.threads == 0 { info::cores() } else { options.threads },
             preset: preset.to_owned(),
             options: options.values().map(|(name, value)| (name, typed(value))).collect(),
-            warnings: result.warnings.clone(),
+            warnings: scene.warnings().iter().chain(&result.warnings).cloned().collect(),
             totals: totals(scene, result),
             phases: Times::default(),
             views,
@@ -187,7 +188,7 @@ fn by_name(counts: [u64; PixelStatus::ALL.len()]) -> BTreeMap<&'static str, u64>
 
 impl From<&CycleRecord> for CycleReport {
     fn from(cycle: &CycleRecord) -> CycleReport {
-        let &CycleRecord { downscale, cycle, pixels, changed, validated } = cycle;
+        let &CycleRecord { downscale, cycle, pixels, changed, validated, .. } = cycle;
         CycleReport { downscale, cycle, pixels, changed, validated }
     }
 }

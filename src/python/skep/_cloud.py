@@ -97,6 +97,8 @@ class FusionView:
     """The views that may see the same surface, as `Scene.overlap` returns them; None takes all others."""
     order: Order = "rgb"
     """Of the image's channels."""
+    confidence: NDArray[Any] | None = None
+    """float32, (height, width), 0 to 1; None is 1 everywhere."""
 
     def fill(self, struct: Any, number: int, view_count: int) -> list[Any]:
         """Writes the view into C's struct; returns the objects that must live as long as it is used."""
@@ -116,7 +118,12 @@ class FusionView:
         struct.normal, struct.normal_stride_bytes = normal.pointer, normal.stride
         struct.image_or_null = ffi.NULL if image is None else image.struct
         struct.overlap, struct.overlap_count = pointer(overlap), overlap.size
-        return [camera, depth, normal, overlap, image]
+        confidence = None
+        if self.confidence is not None:
+            confidence = rows(self.confidence, np.float32, shape, f"{name}.confidence")
+            struct.confidence_or_null = confidence.pointer
+            struct.confidence_stride_bytes = confidence.stride
+        return [camera, depth, normal, overlap, image, confidence]
 
 
 def fuse(

@@ -43,7 +43,7 @@ class Options(Mapping[str, Value]):
     other group has an option of that name: `options.window_radius`. Values are checked when they are set.
 
     Starts from a preset: "default" is the most accurate, "fast" takes less than half of its time, "paper"
-    follows the paper literally. `Options("fast", threads=2, fusion_min_views=2)` sets some at once.
+    follows the paper literally. `Options("fast", threads=2, fusion_min_agreeing_views=2)` sets some at once.
     """
 
     __slots__ = ("_handle",)
@@ -89,9 +89,9 @@ class Options(Mapping[str, Value]):
     """Weighted variance under which a window has no texture and costs 2. (number, 0 to 1, squared gray value,
     of [0, 1]; default: 0.00001)"""
     window_min_texture_to_noise: float
-    """Ratio of the window's variance to the image noise under which the pixel is not matched but filled from
-    the surrounding planes; 0 matches all pixels. (number, 0 to 1000, ratio of variances; default: 2.5, paper:
-    0)"""
+    """Ratio of the window's variance to the image noise under which the pixel is not matched: it keeps the
+    plane of the cycle before where that matches in a larger window, or is filled from the surrounding planes.
+    0 matches all pixels. (number, 0 to 1000, ratio of variances; default: 2.5, paper: 0)"""
     cost_best_views: int
     """Mean over the best views of the pixel's view set; 0 takes the sum over all divided by one less than
     their number (equation 3 of the paper). (whole number, 0 to 8, views; default: 4, fast: 3, paper: 0)"""
@@ -148,12 +148,15 @@ class Options(Mapping[str, Value]):
     """Refine the view set of each pixel by incident angle and visibility; off keeps all source views.
     (switch, true or false; default: true)"""
     view_selection_min_triangulation_angle: float
-    """Smallest triangulation angle of a source view. (number, 0 to 180, degrees; default: 4, paper: 10)"""
+    """Smallest triangulation angle of a source view. (number, 0 to 180, degrees; default: 3, paper: 10)"""
     view_selection_max_triangulation_angle: float
-    """Largest triangulation angle of a source view. (number, 0 to 180, degrees; default: 40, paper: 30)"""
+    """Largest triangulation angle of a source view. (number, 0 to 180, degrees; default: 60, paper: 30)"""
+    view_selection_min_sources: int
+    """Source views that a view gets at least, where as many overlap with it: if fewer lie in the range of
+    angles, those nearest to it are added. (whole number, at least 0, views; default: 6, paper: 0)"""
     view_selection_max_sources: int
-    """Source views of a view, those of smallest triangulation angle; 0 takes all. (whole number, at least 0,
-    views; default: 12, fast: 8, paper: 0)"""
+    """Source views of a view at most; of more, those that are the most useful beside each other. 0 takes all.
+    (whole number, at least 0, views; default: 12, fast: 8, paper: 0)"""
     view_selection_max_incident_angle: float
     """Largest angle between the normal and the ray to a source view. (number, 0 to 90, degrees; default:
     80)"""
@@ -165,12 +168,24 @@ class Options(Mapping[str, Value]):
     default: 0.01)"""
     check_normal_tolerance: float
     """Largest angle between the normals of consistent planes. (number, 0 to 180, degrees; default: 30)"""
+    check_reprojection_tolerance: float
+    """Reprojection error up to which depths count as equal at any triangulation angle, also beyond
+    `depth_tolerance`; widened where the poses have larger errors. 0 leaves it to `depth_tolerance` alone.
+    (number, 0 to 100, pixels; default: 1.25, paper: 0)"""
+    check_slant_tolerance: float
+    """Reprojection error, at the distance of a window's radius, up to which normals count as equal at any
+    triangulation angle; 0 leaves it to `normal_tolerance` alone. (number, 0 to 100, pixels; default: 1,
+    paper: 0)"""
     check_min_consistent_views: int
     """Source views that must be consistent to validate a plane; with 1 and `best_views` a single source view
     is enough to match a pixel, as scenes of two views need. (whole number, at least 1, views; default: 2)"""
     check_min_consistent_fraction: float
     """Fraction of the pixel's view set that must be consistent to validate a plane. (number, 0 to 1, fraction
     of the view set; default: 0.5, paper: 0.7)"""
+    check_few_views: int
+    """Where at most this many source views see the surface, a single consistent one validates a plane, if the
+    errors of the poses leave its depth certain; 0 asks for `min_consistent_views` everywhere. (whole number,
+    0 to 255, views; default: 2, paper: 0)"""
     check_ignore_occluders: bool
     """Leave source views whose own depth is clearly smaller out of that fraction: they may be occluded there.
     (switch, true or false; default: true, paper: false)"""
@@ -191,9 +206,19 @@ class Options(Mapping[str, Value]):
     default: 0.01)"""
     fusion_normal_tolerance: float
     """Largest angle between the normals of pixels that are fused. (number, 0 to 180, degrees; default: 30)"""
-    fusion_min_views: int
-    """Other views that must agree with a pixel to make a point. (whole number, at least 0, views; default: 3,
-    paper: 4)"""
+    fusion_reprojection_tolerance: float
+    """Reprojection error up to which depths count as equal at any triangulation angle, also beyond
+    `depth_tolerance`; 0 leaves it to `depth_tolerance` alone. (number, 0 to 100, pixels; default: 1.25,
+    paper: 0)"""
+    fusion_min_agreeing_views: int
+    """Other views that must agree with a pixel to make a point, where enough see the surface. (whole number,
+    at least 0, views; default: 3, paper: 4)"""
+    fusion_min_agreeing_fraction: float
+    """Fraction of the views that see the surface which must agree, at least one, where that is fewer than
+    `min_agreeing_views`; no view may then contradict the point. 0 asks for `min_agreeing_views` everywhere.
+    (number, 0 to 1, fraction of the views; default: 0.5, paper: 0)"""
+    fusion_min_confidence: float
+    """Smallest confidence of pixels that are fused. (number, 0 to 1, probability; default: 0)"""
     # END OPTIONS
 
     def __init__(self, preset: Literal["default", "fast", "paper"] = "default", **values: Value) -> None:

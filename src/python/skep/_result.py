@@ -70,6 +70,9 @@ class CycleRecord:
     """Pixels whose depth changed by more than 0.1 %."""
     validated: int
     """Pixels validated by the check after it."""
+    median_residual: float
+    """Median distance, in pixels of that size, between where planes project to in the source views and where
+    the source views' own depths lie."""
 
 
 class ResultView:
@@ -117,6 +120,11 @@ class ResultView:
     def cost(self) -> NDArray[np.float32]:
         """Matching cost of the raw plane of every pixel: mean of 1 - NCC over its source views, 0 to 2."""
         return self._borrow(lib.skep_result_borrow_cost, "float", np.float32)
+
+    @cached_property
+    def confidence(self) -> NDArray[np.float32]:
+        """Probability that the raw depth of a pixel is within 1 % of the true one, 0 to 1; 0 without one."""
+        return self._borrow(lib.skep_result_borrow_confidence, "float", np.float32)
 
     @cached_property
     def status(self) -> NDArray[np.uint8]:
@@ -168,7 +176,10 @@ class ResultView:
         found = ffi.new("skep_cycle_record[]", count[0])
         check(lib.skep_result_get_cycles(self._handle, self.view, found, count[0], count))
         return tuple(
-            CycleRecord(one.downscale, one.cycle, one.pixels, one.changed, one.validated) for one in found
+            CycleRecord(
+                one.downscale, one.cycle, one.pixels, one.changed, one.validated, one.median_residual
+            )
+            for one in found
         )
 
 

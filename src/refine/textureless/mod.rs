@@ -17,6 +17,7 @@
 //! Linear in the number of pixels, and for each region `MAX_PLANES` RANSAC searches and as many photo checks,
 //! which have bounded numbers of samples.
 
+mod halo;
 mod photo_check;
 mod region;
 mod rim_planes;
@@ -28,6 +29,7 @@ use crate::geometry::{Grid, PlaneHypothesis, SlantedPlane};
 use crate::matching::Problem;
 use crate::scene::PixelEstimate;
 use glam::DVec3;
+pub(crate) use halo::halos;
 use photo_check::PhotoCheck;
 use region::{PixelSet, Region};
 use rim_planes::{RimPlane, RimSample, fit_rim_planes};
