@@ -385,6 +385,11 @@ fn bad_input_is_named() {
     let text = refused(FusionView { status: Some(&[PixelStatus::Validated; 5]), ..views[0] }, OPTIONS);
     assert!(text.contains("views[0].status is 5 values") && text.contains("12288"), "{text}");
     let small = skep::image::Picture::from_gray(2, 1, vec![0; 2]).unwrap();
+    for wrong in [f32::NAN, f32::INFINITY, -0.1, 1.1] {
+        let confidence = vec![wrong; views[0].camera.pixels()];
+        let text = refused(FusionView { confidence: Some(&confidence), ..views[0] }, OPTIONS);
+        assert!(text.contains("views[0].confidence[0]") && text.contains("0 to 1"), "{text}");
+    }
     let text = refused(FusionView { picture: Some(&small), ..views[0] }, OPTIONS);
     assert!(text.contains("views[0].picture is 2x1") && text.contains("128x96"), "{text}");
     for overlap in [&[0][..], &[2], &[1, 1]] {

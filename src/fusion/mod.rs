@@ -49,7 +49,8 @@ const BAND_ROWS: u32 = 32;
 /// number. The progress function gets [`Phase::Fusion`] with `done` from 0 to 1 for the fusion alone.
 ///
 /// # Errors
-/// Options out of range; an invalid camera; maps or a picture of another size than their camera; an overlap
+/// Options out of range; an invalid camera; maps or a picture of another size than their camera; a confidence
+/// outside of 0 to 1; an overlap
 /// that names no view of the list, the view itself or a view twice; [`Error::Cancelled`].
 ///
 /// # Examples
@@ -136,6 +137,12 @@ fn check_view(views: &[FusionView], index: usize) -> Result<()> {
             let expected = format!("one for each of the camera's {pixels} pixels");
             return Err(Error::argument(format!("{name}.{map}"), format!("{len} values"), expected));
         }
+    }
+    let is_fraction = |confidence: &f32| (0.0..=1.0).contains(confidence);
+    if let Some((pixel, value)) =
+        view.confidence.unwrap_or_default().iter().enumerate().find(|(_, value)| !is_fraction(value))
+    {
+        return Err(Error::argument(format!("{name}.confidence[{pixel}]"), value, "a number of 0 to 1"));
     }
     if let Some(picture) = view.picture
         && (picture.width(), picture.height()) != (view.camera.width, view.camera.height)

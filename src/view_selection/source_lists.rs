@@ -151,17 +151,18 @@ fn select(scene: &Scene, reference: usize, mut pairs: Vec<Pair>, options: &Optio
         (range.near * range.far).sqrt(),
     );
     let direction = |pair: &Pair| scene.views()[pair.source as usize].camera.center() - center;
-    let mut gains: Vec<f64> = pairs.iter().map(Pair::weight).collect();
+    let mut rest: Vec<(usize, f64)> = pairs.iter().map(Pair::weight).enumerate().collect();
     let mut selected = Vec::new();
     while selected.len() < most {
-        let best = (0..pairs.len())
-            .rev()
-            .max_by(|&a, &b| gains[a].total_cmp(&gains[b]))
-            .expect("more pairs than are selected");
+        // Of equal gains the last is the first in the list.
+        let best = rest.iter().enumerate().rev().max_by(|(_, a), (_, b)| a.1.total_cmp(&b.1));
+        let Some((place, _)) = best else { break };
+        let (best, _) = rest.remove(place);
         selected.push(best);
-        gains[best] = -1.0;
-        for (gain, pair) in gains.iter_mut().zip(&pairs) {
-            let apart = direction(pair).angle_between(direction(&pairs[best])).to_degrees() / SAME_DIRECTION;
+        for (other, gain) in &mut rest {
+            let angle = direction(&pairs[*other]).angle_between(direction(&pairs[best])).to_degrees();
+            // No number for a camera at the center itself: as if in the same direction.
+            let apart = if angle.is_finite() { angle / SAME_DIRECTION } else { 0.0 };
             *gain *= 1.0 - (-0.5 * apart * apart).exp();
         }
     }
