@@ -15,8 +15,8 @@
 //! | support s: how well the planes around the pixel continue its plane | s and s^2 |
 //!
 //! A source view has the weight w = min(1, sin angle / sin 20 degrees): at small triangulation angles wrong
-//! depths agree too. The weights of the sum are those of a logistic regression on rendered scenes whose depths
-//! are known.
+//! depths agree too. The weights of the sum are those of a logistic regression on rendered scenes whose
+//! depths are known.
 
 use super::DepthTolerance;
 use crate::geometry::{Grid, SlantedPlane};
@@ -76,8 +76,8 @@ struct Weights {
     squared_support: f32,
 }
 
-/// From a fit to the raw planes of four rendered scenes of 16 views, preset `fast`; its terms for texture and for
-/// validation times support are folded into the others by hand.
+/// From a fit to the raw planes of four rendered scenes of 16 views, preset `fast`; its terms for texture and
+/// for validation times support are folded into the others by hand.
 const WEIGHTS: Weights = Weights {
     bias: 1.06,
     validated: 0.35,

@@ -1,5 +1,5 @@
-//! Residuals of a check: how far the depths of the source views move the projections of a view's planes. Their
-//! median shows the errors of the poses and of the matching.
+//! Residuals of a check: how far the depths of the source views move the projections of a view's planes.
+//! Their median shows the errors of the poses and of the matching.
 
 use super::consistency::ConsistencyCheck;
 use crate::geometry::ViewSets;

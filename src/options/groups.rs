@@ -184,8 +184,8 @@ options! {
         min_triangulation_angle: number(0.0 to 180.0) "degrees",
         /// Largest triangulation angle of a source view.
         max_triangulation_angle: number(0.0 to 180.0) "degrees",
-        /// Source views that a view gets at least, where as many overlap with it: if fewer lie in the range of
-        /// angles, those nearest to it are added.
+        /// Source views that a view gets at least, where as many overlap with it: if fewer lie in the range
+        /// of angles, those nearest to it are added.
         min_sources: count(0 to 4294967295) "views",
         /// Source views of a view at most; of more, those that are the most useful beside each other. 0 takes
         /// all.
@@ -207,16 +207,16 @@ options! {
         /// `depth_tolerance`; widened where the poses have larger errors. 0 leaves it to `depth_tolerance`
         /// alone.
         reprojection_tolerance: number(0.0 to 100.0) "pixels",
-        /// Reprojection error, at the distance of a window's radius, up to which normals count as equal at any
-        /// triangulation angle; 0 leaves it to `normal_tolerance` alone.
+        /// Reprojection error, at the distance of a window's radius, up to which normals count as equal at
+        /// any triangulation angle; 0 leaves it to `normal_tolerance` alone.
         slant_tolerance: number(0.0 to 100.0) "pixels",
         /// Source views that must be consistent to validate a plane; with 1 and `best_views` a single source
         /// view is enough to match a pixel, as scenes of two views need.
         min_consistent_views: count(1 to 4294967295) "views",
         /// Fraction of the pixel's view set that must be consistent to validate a plane.
         min_consistent_fraction: number(0.0 to 1.0) "fraction of the view set",
-        /// Where at most this many source views see the surface, a single consistent one validates a plane, if
-        /// the errors of the poses leave its depth certain; 0 asks for `min_consistent_views` everywhere.
+        /// Where at most this many source views see the surface, a single consistent one validates a plane,
+        /// if the errors of the poses leave its depth certain; 0 asks for `min_consistent_views` everywhere.
         few_views: count(0 to 255) "views",
         /// Leave source views whose own depth is clearly smaller out of that fraction: they may be occluded
         /// there.
@@ -248,8 +248,8 @@ options! {
         reprojection_tolerance: number(0.0 to 100.0) "pixels",
         /// Other views that must agree with a pixel to make a point, where enough see the surface.
         min_agreeing_views: count(0 to 4294967295) "views",
-        /// Fraction of the views that see the surface which must agree, at least one, where that is fewer than
-        /// `min_agreeing_views`; no view may then contradict the point. 0 asks for `min_agreeing_views`
+        /// Fraction of the views that see the surface which must agree, at least one, where that is fewer
+        /// than `min_agreeing_views`; no view may then contradict the point. 0 asks for `min_agreeing_views`
         /// everywhere.
         min_agreeing_fraction: number(0.0 to 1.0) "fraction of the views",
         /// Smallest confidence of pixels that are fused.

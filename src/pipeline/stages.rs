@@ -105,8 +105,8 @@ pub(super) struct SearchInput<'a> {
     pub is_guided: bool,
 }
 
-/// The options, tolerances of the depths of other views widened by the errors of the poses that the last check
-/// of a view found.
+/// The options, tolerances of the depths of other views widened by the errors of the poses that the last
+/// check of a view found.
 fn widened(context: &RunContext, own: Option<&ViewEstimate<Checked>>) -> Options {
     let mut options = context.options.clone();
     let record = own.and_then(|own| own.cycles().last());

@@ -125,9 +125,9 @@ impl Pair {
     }
 }
 
-/// The pairs whose source views are taken: those in the range of the options and, where these are too few, the
-/// nearest outside; of too many, those that are the most useful beside each other. Inside before outside, then
-/// by angle.
+/// The pairs whose source views are taken: those in the range of the options and, where these are too few,
+/// the nearest outside; of too many, those that are the most useful beside each other. Inside before outside,
+/// then by angle.
 fn select(scene: &Scene, reference: usize, mut pairs: Vec<Pair>, options: &Options) -> Vec<Pair> {
     let rules = &options.view_selection;
     pairs.sort_by(|a, b| {
