@@ -238,8 +238,13 @@ check::Owned<skep_scene> hand_over(const Scene &made) {
 Workspace reconstruct_into(const std::string &folder) {
     Scene made = make();
     check::Owned<skep_scene> scene = hand_over(made);
+    skep_options *options = nullptr;
+    check::must(skep_options_create(nullptr, &options));
+    check::Owned<skep_options> owned_options(options, skep_options_destroy);
+    // COLMAP asks the same number of views of every point.
+    check::must(skep_options_set(options, "fusion.min_agreeing_fraction", 0));
     skep_result *result = nullptr;
-    check::must(skep_reconstruct(scene.get(), nullptr, nullptr, nullptr, &result));
+    check::must(skep_reconstruct(scene.get(), options, nullptr, nullptr, &result));
     check::Owned<skep_result> owned_result(result, skep_result_destroy);
     skep_cloud *cloud = nullptr;
     check::must(skep_result_get_cloud(result, &cloud));

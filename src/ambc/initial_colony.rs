@@ -73,13 +73,16 @@ impl<'a, S: Simd> InitialColony<'a, S> {
         if evaluator.is_textureless() {
             let food = match start {
                 Some(start) => {
-                    evidence.set_pixel(at, sets.visible);
                     let food = food_of(&start);
-                    let is_earned = evidence.mean_photometric_cost(&food) < MAX_EVIDENCE_COST;
+                    // An estimate that is not validated is not improved here, and stays so.
+                    let is_earned = food.validated && {
+                        evidence.set_pixel(at, sets.visible);
+                        evidence.mean_photometric_cost(&food) < MAX_EVIDENCE_COST
+                    };
                     if !is_earned {
                         sets.visible.fill(0);
                     }
-                    FoodSource { validated: food.validated && is_earned, ..food }
+                    FoodSource { validated: is_earned, ..food }
                 }
                 None => FoodSource::random(problem, ray, &mut random, (0.0, 1.0)),
             };

@@ -19,16 +19,16 @@
 //! depths are known.
 
 use super::DepthTolerance;
-use crate::geometry::{Grid, SlantedPlane};
+use crate::geometry::{Border, Grid, PaddedMap, Position, SlantedPlane};
 use crate::matching::{Problem, SourceProjector};
 use crate::scene::PixelEstimate;
-use crate::simd::{Simd, SimdLevel, Task, dispatch};
+use crate::simd::{LANES, Simd, SimdLevel, Task, dispatch};
 use rayon::prelude::*;
 
 /// Sine of the triangulation angle from which on a source view has the full weight.
 const FULL_WEIGHT_SINE: f32 = 0.342;
 /// Half the side of the square of neighbors whose planes support a plane.
-const SUPPORT_RADIUS: isize = 3;
+const SUPPORT_RADIUS: i32 = 3;
 /// Distance in pixels of the neighbors along each axis.
 const SUPPORT_STEP: usize = 2;
 /// Relative difference of depths from which on a neighbor does not support a plane.
@@ -118,27 +118,33 @@ impl Task for ConfidenceTask<'_> {
     fn run<S: Simd>(self, simd: S) {
         let ConfidenceTask { problem, tolerance, planes, costs, confidence } = self;
         let grid = Grid { width: problem.image.width, height: problem.image.height };
+        let border = Border { width: SUPPORT_RADIUS as usize, value: 0.0 };
+        let depths = PaddedMap::new(grid, border, |pixel| planes[pixel].depth);
         confidence.par_chunks_mut(grid.width).enumerate().for_each(|(y, row)| {
             simd.vectorize(
                 #[inline(always)]
                 || {
                     let mut projector = SourceProjector::with_all_sources(simd, problem);
-                    for (x, confidence) in row.iter_mut().enumerate() {
-                        let pixel = grid.index((x, y));
-                        let plane = &planes[pixel];
-                        if plane.depth <= 0.0 {
-                            continue;
+                    for (left, confidence) in row.chunks_mut(LANES).enumerate() {
+                        let left = left * LANES;
+                        let supports = support(problem, planes, &depths, (left, y));
+                        for (lane, confidence) in confidence.iter_mut().enumerate() {
+                            let pixel = grid.index((left + lane, y));
+                            let plane = &planes[pixel];
+                            if plane.depth <= 0.0 {
+                                continue;
+                            }
+                            projector.set_pixel((left + lane) as f32, y as f32);
+                            let mut evidence = Evidence {
+                                is_validated: plane.validated,
+                                consistent_views: plane.consistent_views,
+                                cost: costs[pixel],
+                                support: supports[lane],
+                                ..Evidence::default()
+                            };
+                            add_votes(simd, problem, &projector, tolerance, plane.depth, &mut evidence);
+                            *confidence = evidence.confidence();
                         }
-                        projector.set_pixel(x as f32, y as f32);
-                        let mut evidence = Evidence {
-                            is_validated: plane.validated,
-                            consistent_views: plane.consistent_views,
-                            cost: costs[pixel],
-                            support: support(problem, grid, planes, pixel),
-                            ..Evidence::default()
-                        };
-                        add_votes(simd, problem, &projector, tolerance, plane.depth, &mut evidence);
-                        *confidence = evidence.confidence();
                     }
                 },
             );
@@ -182,24 +188,38 @@ fn add_votes<S: Simd>(
     }
 }
 
-/// How well the planes around a pixel continue its plane, 0 to 1.
-fn support(problem: &Problem, grid: Grid, planes: &[PixelEstimate], pixel: usize) -> f32 {
-    let PixelEstimate { depth, normal, .. } = planes[pixel];
-    let (x, y) = grid.position(pixel);
-    let plane = SlantedPlane::new(depth, normal, problem.ray(x as f32, y as f32), problem.inverse_focal);
-    let (mut sum, mut count) = (0.0, 0.0);
+/// How well the planes around each of `LANES` pixels from this one on continue its plane, 0 to 1.
+#[inline(always)]
+fn support(problem: &Problem, planes: &[PixelEstimate], depths: &PaddedMap, at: Position) -> [f32; LANES] {
+    let grid = Grid { width: problem.image.width, height: problem.image.height };
+    let (mut inverse_depth, mut slope_x, mut slope_y) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    for lane in 0..LANES.min(grid.width - at.0) {
+        let PixelEstimate { depth, normal, .. } = planes[grid.index((at.0 + lane, at.1))];
+        let ray = problem.ray((at.0 + lane) as f32, at.1 as f32);
+        let plane = SlantedPlane::new(depth, normal, ray, problem.inverse_focal);
+        (inverse_depth[lane], slope_x[lane], slope_y[lane]) =
+            (plane.inverse_depth, plane.slope_x, plane.slope_y);
+    }
     let offsets = || (-SUPPORT_RADIUS..=SUPPORT_RADIUS).step_by(SUPPORT_STEP);
+    let mut sums = [0.0; LANES];
     for dy in offsets() {
-        let Some(row) = y.checked_add_signed(dy).filter(|&row| row < grid.height) else { continue };
         for dx in offsets() {
-            let Some(column) = x.checked_add_signed(dx).filter(|&column| column < grid.width) else {
-                continue;
-            };
-            let other = planes[grid.index((column, row))].depth;
-            let error = (plane.inverse_depth_at(dx as f32, dy as f32) * other - 1.0) / SUPPORT_TOLERANCE;
-            count += 1.0;
-            sum += if other > 0.0 { (1.0 - error * error).max(0.0) } else { 0.0 };
+            // 0 outside of the image and where there is no plane.
+            let others = depths.lanes(at, (dx, dy));
+            for lane in 0..LANES {
+                let predicted = inverse_depth[lane] + slope_x[lane] * dx as f32 + slope_y[lane] * dy as f32;
+                let error = (predicted * others[lane] - 1.0) * (1.0 / SUPPORT_TOLERANCE);
+                let support = 1.0 - error * error;
+                sums[lane] += if support > 0.0 { support } else { 0.0 };
+            }
         }
     }
-    if count > 0.0 { sum / count } else { 0.0 }
+    let count_inside = |at: usize, size: usize| {
+        offsets().filter(|&offset| at.checked_add_signed(offset as isize).is_some_and(|at| at < size)).count()
+    };
+    let rows = count_inside(at.1, grid.height);
+    std::array::from_fn(|lane| {
+        let count = rows * count_inside(at.0 + lane, grid.width);
+        if count > 0 { sums[lane] / count as f32 } else { 0.0 }
+    })
 }

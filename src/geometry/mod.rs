@@ -6,6 +6,7 @@
 mod camera;
 mod depth_range;
 mod grid;
+mod padded_map;
 mod plane;
 mod relative_pose;
 mod view_set;
@@ -14,6 +15,7 @@ pub use camera::Camera;
 pub use depth_range::DepthRange;
 pub(crate) use depth_range::SearchRange;
 pub(crate) use grid::{Grid, Offset, Position};
+pub(crate) use padded_map::{Border, PaddedMap};
 pub(crate) use plane::{MIN_FACING, PlaneHypothesis};
 pub use plane::{Plane, SlantedPlane};
 pub use relative_pose::{RelativePose, plane_homography};

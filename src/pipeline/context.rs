@@ -93,7 +93,7 @@ impl RunContext {
     /// The data of a view that the filters of its planes read.
     pub(super) fn filtered_view(&self, at: Place) -> FilteredView<'_> {
         let ScaledView { camera, image, range, .. } = self.scaled(at);
-        FilteredView { camera, image, range: *range }
+        FilteredView { camera, image, range: *range, level: self.level }
     }
 
     /// A view and its sources with their published surfaces.

@@ -170,7 +170,15 @@ impl Scene {
         let image = PackedImage::new(&Picture::from_gray(width, height, self.grays.clone()).unwrap());
         let problem = Problem::new(&self.camera, &image, self.range);
         let filter = make(&problem, &self.is_textureless);
-        call(&*filter, &FilteredView { camera: &self.camera, image: &image, range: self.range })
+        call(
+            &*filter,
+            &FilteredView {
+                camera: &self.camera,
+                image: &image,
+                range: self.range,
+                level: SimdLevel::detect(),
+            },
+        )
     }
 
     fn filtered(&self, make: MakeFilter) -> Filtered {

@@ -16,9 +16,9 @@
 //! stereo correspondence algorithms" (2002); the weights are those of a bilateral filter (Tomasi and
 //! Manduchi, 1998).
 
-use super::stencil::{BilateralStencil, Border, GrayWeights, PaddedMap, Stencil};
+use super::stencil::{BilateralStencil, GrayWeights, Stencil};
 use super::{Domain, Filter, FilteredView, marked_pixels};
-use crate::geometry::{Grid, Offset, PlaneHypothesis, Position, SlantedPlane};
+use crate::geometry::{Border, Grid, Offset, PaddedMap, PlaneHypothesis, Position, SlantedPlane};
 use crate::scene::{PixelEstimate, validated_planes};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -296,7 +296,10 @@ mod tests {
     }
 
     fn correct(filter: CorrectFattening, image: &PackedImage, planes: &mut [PixelEstimate]) {
-        filter.apply(&FilteredView { camera: &camera(), image, range: RANGE }, planes);
+        filter.apply(
+            &FilteredView { camera: &camera(), image, range: RANGE, level: SimdLevel::detect() },
+            planes,
+        );
     }
 
     fn first_cycles(passes: u32) -> CorrectFattening {
@@ -372,6 +375,7 @@ mod tests {
             camera: &camera(),
             image: &two_surfaces(),
             range: DepthRange { near: 1.0, far: 6.0 },
+            level: SimdLevel::detect(),
         };
         let mut planes = fattened(8.0, 4);
         assert_eq!(first_cycles(4).apply(&view, &mut planes), [0u32; 0]);

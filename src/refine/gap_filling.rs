@@ -170,7 +170,7 @@ mod tests {
         let grays = (0..planes.len()).map(gray).collect();
         let image = PackedImage::new(&Picture::from_gray(SIZE.0, SIZE.1, grays).unwrap());
         let mut after = planes.to_vec();
-        let view = FilteredView { camera: &camera(), image: &image, range };
+        let view = FilteredView { camera: &camera(), image: &image, range, level: SimdLevel::detect() };
         let filled = FillGaps.apply(&view, &mut after);
         let result = |pixel| filled.binary_search(&(pixel as u32)).is_ok().then(|| after[pixel]);
         (0..planes.len()).map(result).collect()

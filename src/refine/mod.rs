@@ -26,6 +26,7 @@ mod contract;
 use crate::geometry::{Camera, DepthRange, Grid, PlaneHypothesis, Position};
 use crate::image::PackedImage;
 use crate::scene::PixelEstimate;
+use crate::simd::SimdLevel;
 use glam::{DVec2, Vec3};
 
 /// The view whose planes are filtered.
@@ -37,6 +38,8 @@ pub(crate) struct FilteredView<'a> {
     pub image: &'a PackedImage,
     /// The range that depths are limited to.
     pub range: DepthRange,
+    /// Instruction set.
+    pub level: SimdLevel,
 }
 
 impl FilteredView<'_> {

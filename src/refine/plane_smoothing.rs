@@ -17,11 +17,10 @@
 //!
 //! Source: the bilateral filter (Tomasi and Manduchi, 1998), on planes.
 
-use super::stencil::{Border, PaddedMap};
 use super::{Domain, Filter, FilteredView, marked_pixels};
-use crate::geometry::{Offset, PlaneHypothesis, Position};
+use crate::geometry::{Border, Offset, PaddedMap, PlaneHypothesis, Position};
 use crate::scene::{PixelEstimate, validated_planes};
-use crate::simd::LANES;
+use crate::simd::{LANES, Simd, Task, dispatch};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -69,21 +68,43 @@ impl Filter for SmoothPlanes {
 }
 
 fn smooth_once(view: &FilteredView, planes: &mut [PixelEstimate], is_replaced: &mut [bool]) {
-    let width = view.image.width;
     let maps = PlaneMaps::new(view, planes);
-    let rows = planes.par_chunks_mut(width).zip(is_replaced.par_chunks_mut(width));
-    rows.enumerate().for_each(|(y, (row, is_replaced))| {
-        for left in (0..width).step_by(LANES) {
-            let sums = maps.sum((left, y));
-            for (lane, estimate) in row[left..].iter_mut().take(LANES).enumerate() {
-                let (x, mean) = (left + lane, sums.mean(lane));
-                if estimate.validated && view.is_usable(mean, (x, y)) {
-                    (estimate.depth, estimate.normal) = (mean.depth, mean.normal);
-                    is_replaced[x] = true;
-                }
-            }
-        }
-    });
+    dispatch(view.level, SmoothTask { view, maps, planes, is_replaced });
+}
+
+/// A pass over all rows.
+struct SmoothTask<'a> {
+    view: &'a FilteredView<'a>,
+    maps: PlaneMaps,
+    planes: &'a mut [PixelEstimate],
+    is_replaced: &'a mut [bool],
+}
+
+impl Task for SmoothTask<'_> {
+    type Output = ();
+
+    fn run<S: Simd>(self, simd: S) {
+        let SmoothTask { view, maps, planes, is_replaced } = self;
+        let width = view.image.width;
+        let rows = planes.par_chunks_mut(width).zip(is_replaced.par_chunks_mut(width));
+        rows.enumerate().for_each(|(y, (row, is_replaced))| {
+            simd.vectorize(
+                #[inline(always)]
+                || {
+                    for left in (0..width).step_by(LANES) {
+                        let sums = maps.sum((left, y));
+                        for (lane, estimate) in row[left..].iter_mut().take(LANES).enumerate() {
+                            let (x, mean) = (left + lane, sums.mean(lane));
+                            if estimate.validated && view.is_usable(mean, (x, y)) {
+                                (estimate.depth, estimate.normal) = (mean.depth, mean.normal);
+                                is_replaced[x] = true;
+                            }
+                        }
+                    }
+                },
+            );
+        });
+    }
 }
 
 /// The input of a pass by component.
@@ -131,6 +152,7 @@ impl PlaneMaps {
     }
 
     /// The sums over the neighbors of `LANES` pixels from this one on.
+    #[inline(always)]
     fn sum(&self, at: Position) -> Sums {
         let mut sums = Sums::default();
         let radius = RADIUS as i32;
@@ -213,7 +235,7 @@ mod tests {
     fn smooth(gray: impl Fn(usize) -> u8, range: DepthRange, planes: &mut [PixelEstimate]) {
         let grays = (0..planes.len()).map(gray).collect();
         let image = PackedImage::new(&Picture::from_gray(SIZE.0, SIZE.1, grays).unwrap());
-        let view = FilteredView { camera: &camera(), image: &image, range };
+        let view = FilteredView { camera: &camera(), image: &image, range, level: SimdLevel::detect() };
         SmoothPlanes { passes: 1 }.apply(&view, planes);
     }
 

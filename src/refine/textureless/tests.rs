@@ -15,7 +15,12 @@ fn keeps_the_contract() {
 }
 
 fn view<'a>(world: &'a World) -> FilteredView<'a> {
-    FilteredView { camera: &world.cameras[0], image: &world.images[0], range: RANGE }
+    FilteredView {
+        camera: &world.cameras[0],
+        image: &world.images[0],
+        range: RANGE,
+        level: SimdLevel::detect(),
+    }
 }
 
 /// The wall in a single view; the pixels of a hole are textureless and have wrong planes that are not
