@@ -28,7 +28,7 @@ const GRAY: [u8; 3] = [128; 3];
 /// median; the first member is the pixel of the reference. `color` is `None` for members without a picture.
 pub(super) fn average(
     members: &[Member],
-    color: impl Fn(&Member) -> Option<[u8; 3]>,
+    color: impl Fn(&Member) -> Option<DVec3>,
 ) -> (DVec3, DVec3, [u8; 3]) {
     let start = &members[0];
     // Along the normal only: across it, pixel centers differ from the point by up to half a pixel.
@@ -38,25 +38,36 @@ pub(super) fn average(
     let limit = MAX_DEVIATIONS * median(members.iter().map(deviation).collect());
 
     let (mut offset, mut normal, mut weight) = (DVec3::ZERO, DVec3::ZERO, 0.0);
-    let (mut colors, mut color_weight) = (DVec3::ZERO, 0.0);
+    let mut colors = Vec::new();
     for member in members.iter().filter(|member| deviation(member) <= limit) {
         offset += (member.position - start.position) * member.weight;
         normal += member.normal * member.weight;
         weight += member.weight;
-        if let Some(color) = color(member) {
-            colors += DVec3::from_array(color.map(f64::from)) * member.weight;
-            color_weight += member.weight;
-        }
+        colors.extend(color(member).map(|color| (color, member.weight)));
     }
-    let color = match color_weight > 0.0 {
-        true => (colors / color_weight).round().to_array().map(|channel| channel as u8),
-        false => GRAY,
-    };
-    (start.position + offset / weight, normal.try_normalize().unwrap_or(start.normal), color)
+    (start.position + offset / weight, normal.try_normalize().unwrap_or(start.normal), average_color(&colors))
+}
+
+/// The weighted mean of the colors whose brightness is within [`MAX_DEVIATIONS`] of the median: beside the
+/// edge of a surface some views see what is behind it.
+fn average_color(colors: &[(DVec3, f64)]) -> [u8; 3] {
+    if colors.is_empty() {
+        return GRAY;
+    }
+    let brightness = |color: DVec3| color.element_sum() / 3.0;
+    let middle = median(colors.iter().map(|&(color, _)| brightness(color)).collect());
+    let deviation = |color: DVec3| (brightness(color) - middle).abs();
+    let limit = MAX_DEVIATIONS * median(colors.iter().map(|&(color, _)| deviation(color)).collect());
+    let (mut sum, mut weights) = (DVec3::ZERO, 0.0);
+    for &(color, weight) in colors.iter().filter(|&&(color, _)| deviation(color) <= limit) {
+        sum += color * weight;
+        weights += weight;
+    }
+    (sum / weights).round().to_array().map(|channel| channel as u8)
 }
 
 /// The middle value, or the mean of the two in the middle. At least one value.
-fn median(mut values: Vec<f64>) -> f64 {
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     let middle = values.len() / 2;
     if values.len() % 2 == 1 { values[middle] } else { (values[middle - 1] + values[middle]) / 2.0 }
@@ -82,7 +93,7 @@ mod tests {
         let mut members = [0.0, 1.0].map(member);
         members[1].weight = 3.0;
         let (position, _, color) =
-            average(&members, |member| Some([if member.weight > 1.0 { 200 } else { 100 }; 3]));
+            average(&members, |member| Some(DVec3::splat(if member.weight > 1.0 { 200.0 } else { 100.0 })));
         assert_eq!(position.z, 0.75);
         assert_eq!(color, [175; 3]);
     }
@@ -91,7 +102,7 @@ mod tests {
     fn members_without_pictures_do_not_darken_the_color() {
         let mut members = [0.0, 0.0].map(member);
         members[1].view = 1;
-        let color = |member: &Member| (member.view == 0).then_some([10, 20, 30]);
+        let color = |member: &Member| (member.view == 0).then_some(DVec3::new(10.0, 20.0, 30.0));
         assert_eq!(average(&members, color).2, [10, 20, 30]);
         assert_eq!(average(&members, |_| None).2, GRAY);
     }

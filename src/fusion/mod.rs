@@ -7,6 +7,7 @@
 
 mod average;
 mod cloud;
+mod exposure;
 mod overlap;
 mod source;
 
@@ -104,15 +105,21 @@ pub fn fuse(views: &[FusionView], options: &FusionOptions, progress: ProgressFn)
         if progress(&at).is_break() { Err(Error::Cancelled) } else { Ok(()) }
     };
 
+    let references: Vec<Reference> =
+        (0..views.len()).map(|index| Reference::new(views, index, options, &used)).collect();
+    let gains = match options.compensate_exposure {
+        true => exposure::gains(views, &references),
+        false => vec![[1.0; 3]; views.len()],
+    };
     let mut cloud = PointCloud::default();
-    for index in 0..views.len() {
-        let reference = Reference::new(views, index, options, &used);
+    for (index, reference) in references.iter().enumerate() {
         let height = views[index].camera.height;
         for top in (0..height).step_by(BAND_ROWS as usize) {
             report(index, rows_done)?;
             let rows = top..height.min(top + BAND_ROWS);
             rows_done += rows.len() as u64;
-            let fused: Vec<PointCloud> = rows.into_par_iter().map(|row| reference.fuse_row(row)).collect();
+            let fused: Vec<PointCloud> =
+                rows.into_par_iter().map(|row| reference.fuse_row(row, &gains)).collect();
             fused.iter().for_each(|points| append(&mut cloud, points));
         }
     }
@@ -219,9 +226,26 @@ impl<'a> Reference<'a> {
         Reference { views, index, options, sources: sources.collect(), used }
     }
 
-    fn fuse_row(&self, row: u32) -> PointCloud {
+    /// The place, depth and member of a pixel with a usable estimate.
+    fn start(&self, (column, row): (u32, u32)) -> Option<(DVec2, f64, Member)> {
         let view = &self.views[self.index];
+        let pixel = row as usize * view.camera.width as usize + column as usize;
+        let (depth, normal) = estimate(view, self.options, pixel)?;
+        let place = DVec2::new(f64::from(column), f64::from(row));
         let to_world = view.camera.rotation.transpose();
+        let start = Member {
+            view: self.index as u32,
+            pixel,
+            position: to_world * (view.camera.ray(place) * depth),
+            normal: to_world * normal,
+            weight: weight(view, pixel, depth),
+        };
+        Some((place, depth, start))
+    }
+
+    /// The points that start in a row; `gains` are the factors of the colors of each view.
+    fn fuse_row(&self, row: u32, gains: &[[f64; 3]]) -> PointCloud {
+        let view = &self.views[self.index];
         let first = row as usize * view.camera.width as usize;
         let mut points = PointCloud::default();
         let (mut members, mut point_views) = (Vec::new(), Vec::new());
@@ -230,16 +254,8 @@ impl<'a> Reference<'a> {
             if self.used[self.index].has(pixel) {
                 continue;
             }
-            let Some((depth, normal)) = estimate(view, self.options, pixel) else { continue };
-            let position = DVec2::new(f64::from(column), f64::from(row));
-            let start = Member {
-                view: self.index as u32,
-                pixel,
-                position: to_world * (view.camera.ray(position) * depth),
-                normal: to_world * normal,
-                weight: weight(view, pixel, depth),
-            };
-            if !self.collect_members(start, position, depth, &mut members) {
+            let Some((place, depth, start)) = self.start((column, row)) else { continue };
+            if !self.collect_members(start, place, depth, &mut members) {
                 continue;
             }
             for member in &members[1..] {
@@ -248,7 +264,9 @@ impl<'a> Reference<'a> {
             point_views.clear();
             point_views.extend(members.iter().map(|member| member.view));
             let (position, normal, color) = average(&members, |member| {
-                self.views[member.view as usize].picture.map(|picture| picture.rgb(member.pixel))
+                let view = member.view as usize;
+                let color = |rgb| DVec3::from_array(rgb) * DVec3::from_array(gains[view]);
+                self.views[view].picture.map(|picture| color(picture.rgb(member.pixel).map(f64::from)))
             });
             points.positions.push((view.camera.center() + position).to_array());
             points.normals.push(normal.as_vec3().to_array());

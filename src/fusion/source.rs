@@ -27,7 +27,7 @@ const MAX_TOLERANCE: f64 = 0.05;
 
 /// A view that overlaps the reference, with the transforms from one to the other.
 pub(super) struct Source<'a> {
-    index: u32,
+    pub(super) index: u32,
     view: &'a FusionView<'a>,
     /// `K' R K^-1`: a reference pixel (x, y, 1) at depth d falls on `transfer (x, y, 1) d + shift`.
     transfer: DMat3,

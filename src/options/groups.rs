@@ -254,5 +254,8 @@ options! {
         min_agreeing_fraction: number(0.0 to 1.0) "fraction of the views",
         /// Smallest confidence of pixels that are fused.
         min_confidence: number(0.0 to 1.0) "probability",
+        /// Multiply the colors of each photograph by a factor for each channel, so that photographs of
+        /// different exposure or white balance agree on the points they share.
+        compensate_exposure: switch() "switch",
     }
 }

@@ -99,6 +99,7 @@ impl Options {
                 min_agreeing_views: 4,
                 min_agreeing_fraction: 0.0,
                 min_confidence: 0.0,
+                compensate_exposure: false,
             },
         }
     }
@@ -190,6 +191,7 @@ impl Default for Options {
                 reprojection_tolerance: 1.25,
                 min_agreeing_views: 3,
                 min_agreeing_fraction: 0.5,
+                compensate_exposure: true,
                 ..paper.fusion
             },
             ..paper

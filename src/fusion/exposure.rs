@@ -1,0 +1,106 @@
+//! Exposure compensation: photographs of one scene differ in exposure and white balance, and a point's color,
+//! averaged over those that see it, would show seams where their set changes.
+//!
+//! For each pair of overlapping views and each channel, `m` is the median of `ln(c_a / c_b)` over points that
+//! both see. The gains `exp(g)` minimize `sum n (g_a - g_b + m)^2` over all pairs of `n` points each, and are
+//! 1 in the mean.
+
+use super::source::{Comparison, Source};
+use super::{FusionView, Reference};
+use rayon::prelude::*;
+
+/// Every pixel in so many rows and columns is compared.
+const STEP: u32 = 8;
+/// Colors beyond are clipped, or mostly noise.
+const USABLE: std::ops::RangeInclusive<u8> = 8..=247;
+/// Fewest points that a pair of views is compared by.
+const MIN_POINTS: usize = 30;
+/// Weight of gains of 1, as a fraction of that of the pairs.
+const PRIOR: f64 = 1e-3;
+/// Sweeps of the Gauss-Seidel iteration.
+const SWEEPS: usize = 200;
+
+/// Logarithms of the ratios of the colors of two views.
+struct Pair {
+    views: [usize; 2],
+    points: f64,
+    ratio: [f64; 3],
+}
+
+/// Factors of red, green and blue for each view.
+pub(super) fn gains(views: &[FusionView], references: &[Reference]) -> Vec<[f64; 3]> {
+    let pairs: Vec<Pair> =
+        references.par_iter().flat_map_iter(|reference| pairs_of(views, reference)).collect();
+    solve(views.len(), &pairs).into_iter().map(|gain| gain.map(f64::exp)).collect()
+}
+
+fn pairs_of(views: &[FusionView], reference: &Reference) -> Vec<Pair> {
+    reference.sources.iter().filter_map(|source| pair(views, reference, source)).collect()
+}
+
+/// Compares the colors of the reference and a source where they see the same surface.
+fn pair(views: &[FusionView], reference: &Reference, source: &Source) -> Option<Pair> {
+    let camera = views[reference.index].camera;
+    let own_picture = views[reference.index].picture?;
+    let mut ratios: [Vec<f64>; 3] = Default::default();
+    for row in (0..camera.height).step_by(STEP as usize) {
+        for column in (0..camera.width).step_by(STEP as usize) {
+            let Some((pixel, depth, start)) = reference.start((column, row)) else { continue };
+            let Comparison::Consistent(other) = source.compare(pixel, depth, &start) else { continue };
+            let (own, other) =
+                (own_picture.rgb(start.pixel), views[other.view as usize].picture?.rgb(other.pixel));
+            if own.iter().chain(&other).all(|channel| USABLE.contains(channel)) {
+                for (channel, ratios) in ratios.iter_mut().enumerate() {
+                    ratios.push((f64::from(own[channel]) / f64::from(other[channel])).ln());
+                }
+            }
+        }
+    }
+    let points = ratios[0].len();
+    (points >= MIN_POINTS).then(|| Pair {
+        views: [reference.index, source.index as usize],
+        points: points as f64,
+        ratio: ratios.map(super::average::median),
+    })
+}
+
+/// The logarithms of the gains.
+fn solve(views: usize, pairs: &[Pair]) -> Vec<[f64; 3]> {
+    let mut by_view = vec![Vec::new(); views];
+    for pair in pairs {
+        let [first, second] = pair.views;
+        by_view[first].push((second, pair.points, pair.ratio.map(|ratio| -ratio)));
+        by_view[second].push((first, pair.points, pair.ratio));
+    }
+    let mut gains = vec![[0.0; 3]; views];
+    for _ in 0..SWEEPS {
+        for (view, others) in by_view.iter().enumerate() {
+            let weights: f64 = others.iter().map(|(_, points, _)| points).sum();
+            if weights > 0.0 {
+                gains[view] = std::array::from_fn(|channel| {
+                    let wanted = |&(other, points, ratio): &(usize, f64, [f64; 3])| {
+                        points * (gains[other][channel] + ratio[channel])
+                    };
+                    others.iter().map(wanted).sum::<f64>() / (weights * (1.0 + PRIOR))
+                });
+            }
+        }
+    }
+    gains
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gains_undo_the_ratios_of_a_chain_of_views_and_are_1_without_pairs() {
+        let pair =
+            |first, second, ratio: f64| Pair { views: [first, second], points: 100.0, ratio: [ratio; 3] };
+        let gains = solve(4, &[pair(0, 1, 0.2), pair(1, 2, -0.1)]);
+        let difference = |first: usize, second: usize| gains[first][0] - gains[second][0];
+        assert!((difference(0, 1) + 0.2).abs() < 2e-3 && (difference(1, 2) - 0.1).abs() < 2e-3, "{gains:?}");
+        assert!((gains[0][0] + gains[1][0] + gains[2][0]).abs() < 0.01);
+        assert_eq!(gains[3], [0.0; 3]);
+    }
+}
