@@ -24,8 +24,9 @@ const RADIUS: i32 = 4;
 const SPATIAL_SIGMA: f32 = 2.7;
 /// Difference of gray values (0 to 255) with weight 1 / sqrt(e): a few deviations of a photograph's noise.
 const GRAY_SIGMA: f32 = 6.0;
-/// Smallest weight of a difference of gray values: where all neighbors differ, the distance decides.
-const MIN_GRAY_WEIGHT: f32 = 1e-6;
+/// Neighbors whose gray value differs so much that their weight is below are another surface: the planes at a
+/// skyline say nothing about the sky.
+const MIN_GRAY_WEIGHT: f32 = 1e-3;
 /// Relative difference of inverse depths below which two neighbors are on the same surface; equal to the
 /// largest error of depth that the default check tolerates.
 const SAME_SURFACE: f32 = 0.01;
@@ -98,11 +99,13 @@ impl Surfaces<'_> {
                 let plane = &self.planes[neighbor.pixel];
                 let (dx, dy) = neighbor.offset;
                 let inverse_depth = plane.inverse_depth_at(-dx as f32, -dy as f32);
-                (plane.inverse_depth > 0.0 && inverse_depth > 0.0).then_some(Prediction {
-                    inverse_depth,
-                    normal: self.estimates[neighbor.pixel].normal,
-                    weight: neighbor.weight,
-                })
+                (neighbor.weight > 0.0 && plane.inverse_depth > 0.0 && inverse_depth > 0.0).then_some(
+                    Prediction {
+                        inverse_depth,
+                        normal: self.estimates[neighbor.pixel].normal,
+                        weight: neighbor.weight,
+                    },
+                )
             })
             .collect();
         heaviest_surface(&predictions).filter(|&plane| view.is_usable(plane, position))

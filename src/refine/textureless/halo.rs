@@ -1,9 +1,10 @@
 //! Halos of textureless regions: beside the outline of a region without a surface, windows reach over the
 //! outline and match by what is beyond, up to half a window's width into the region. Such pixels have the
-//! gray value of the region.
+//! gray value of the region, or, in the glow of its edge, one nearer to it than to that of the surface.
 
 use crate::geometry::Grid;
 use crate::image::{PackedImage, blurred, deviation};
+use glam::Vec2;
 
 /// Pixels by which a halo reaches into a region: the half side of a window at half size, at full size.
 const MAX_WIDTH: usize = 12;
@@ -13,6 +14,31 @@ const MIN_AREA: usize = 400;
 const MAX_DIFFERENCE_NOISE: f32 = 1.0;
 /// Allowance on top of it, in gray values: ringing of compressed images.
 const MAX_DIFFERENCE_OFFSET: f32 = 1.0;
+/// The same, as a fraction of the difference of the surface, [`AHEAD`] pixels farther from the region: the
+/// outline is where half of the light is the region's.
+const MAX_DIFFERENCE_FRACTION: f32 = 0.5;
+/// Pixels beyond which the blur of an edge is over.
+const AHEAD: f32 = 4.0;
+
+/// A pixel that a halo grows from.
+#[derive(Clone, Copy)]
+struct Front {
+    pixel: usize,
+    /// The pixel of the region that it was reached from.
+    origin: usize,
+    /// Gray value of the region there.
+    gray: f32,
+}
+
+/// The pixel [`AHEAD`] beyond another, seen from an origin; `None` outside of the image.
+fn ahead(grid: Grid, origin: usize, pixel: usize) -> Option<usize> {
+    let [from, to] = [origin, pixel].map(|pixel| {
+        let (x, y) = grid.position(pixel);
+        Vec2::new(x as f32, y as f32)
+    });
+    let step = ((to - from).normalize_or_zero() * AHEAD).round();
+    grid.neighbor(grid.position(pixel), (step.x as i32, step.y as i32)).map(|position| grid.index(position))
+}
 
 /// The pixels around regions without evidence that have the gray value of the region, ascending.
 pub(crate) fn halos(image: &PackedImage, has_no_evidence: &[bool]) -> Vec<u32> {
@@ -20,7 +46,7 @@ pub(crate) fn halos(image: &PackedImage, has_no_evidence: &[bool]) -> Vec<u32> {
     let mut is_taken = has_no_evidence.to_vec();
     let mut is_traced = vec![false; grid.pixels()];
     let neighbors = |pixel| grid.four_neighbors(pixel).into_iter().flatten();
-    let mut front: Vec<(usize, f32)> = Vec::new();
+    let mut front: Vec<Front> = Vec::new();
     for first in 0..grid.pixels() {
         if !has_no_evidence[first] || is_traced[first] {
             continue;
@@ -38,22 +64,26 @@ pub(crate) fn halos(image: &PackedImage, has_no_evidence: &[bool]) -> Vec<u32> {
         }
         if region.len() >= MIN_AREA {
             let is_at_rim = |&&pixel: &&usize| neighbors(pixel).any(|other| !has_no_evidence[other]);
-            front.extend(region.iter().filter(is_at_rim).map(|&pixel| (pixel, blurred(image, pixel, 2))));
+            let start = |&pixel| Front { pixel, origin: pixel, gray: blurred(image, pixel, 2) };
+            front.extend(region.iter().filter(is_at_rim).map(start));
         }
     }
     let mut halo = Vec::new();
     for _ in 0..MAX_WIDTH {
         let mut next = Vec::new();
-        for (pixel, gray) in front {
+        for from in front {
+            let Front { pixel, origin, gray } = from;
             for other in neighbors(pixel) {
                 if is_taken[other] {
                     continue;
                 }
-                let difference = (blurred(image, other, 1) - gray).abs();
-                if difference < MAX_DIFFERENCE_NOISE * deviation(image, other) + MAX_DIFFERENCE_OFFSET {
+                let difference = |pixel| (blurred(image, pixel, 1) - gray).abs();
+                let of_surface = ahead(grid, origin, other).map_or(0.0, difference);
+                let limit = MAX_DIFFERENCE_NOISE * deviation(image, other) + MAX_DIFFERENCE_OFFSET;
+                if difference(other) < limit.max(MAX_DIFFERENCE_FRACTION * of_surface) {
                     is_taken[other] = true;
                     halo.push(other as u32);
-                    next.push((other, gray));
+                    next.push(Front { pixel: other, ..from });
                 }
             }
         }
