@@ -17,6 +17,7 @@ const OPTIONS: FusionOptions = FusionOptions {
     min_agreeing_views: 3,
     min_agreeing_fraction: 0.0,
     min_confidence: 0.0,
+    compensate_exposure: false,
 };
 
 /// For every view all the others.
@@ -426,4 +427,23 @@ fn a_pixel_that_became_part_of_a_point_starts_none() {
     for view in 2..9 {
         assert!(starts(view) * 2 < first, "view {view} starts {} points", starts(view));
     }
+}
+
+#[test]
+fn photographs_of_different_exposure_agree_on_the_colors_of_their_points() {
+    let mut made = procedural::plane_and_sphere();
+    for (index, view) in made.views.iter_mut().enumerate() {
+        let (width, height) = (view.picture.width(), view.picture.height());
+        let gray = [100, 80, 120, 90, 110][index % 5];
+        let grays = vec![gray; (width * height) as usize];
+        view.picture = skep::image::Picture::from_gray(width, height, grays).unwrap();
+    }
+    // Between the darkest and the brightest point: their sets of views differ.
+    let spread = |compensate_exposure| {
+        let cloud = fuse_maps(&made, &made.truth, FusionOptions { compensate_exposure, ..OPTIONS });
+        let grays = || cloud.colors.iter().map(|color| color[0]);
+        grays().max().unwrap() - grays().min().unwrap()
+    };
+    assert!(spread(false) > 5, "{}", spread(false));
+    assert!(spread(true) <= 1, "{}", spread(true));
 }

@@ -6,6 +6,9 @@ use crate::geometry::{MIN_FACING, PlaneHypothesis, SlantedPlane};
 use crate::matching::Problem;
 use glam::Vec3;
 
+/// One in so many random planes is drawn beyond the likely range, where there is a wider one.
+const OUTER_DRAWS: f32 = 16.0;
+
 /// A plane at a pixel and what it costs there. It is stored as depth at its pixel and normal: the same plane
 /// at another pixel is a transfer, and clamping to the depth range is exact.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,12 +32,20 @@ impl FoodSource {
         FoodSource { depth, normal, cost: f32::INFINITY, trials: 0, validated: false }
     }
 
-    /// A random plane: uniform in inverse depth within the given part (0 to 1) of the range, and over the
-    /// visible hemisphere (section 5.1 of the paper).
+    /// A random plane: uniform in inverse depth within the given part (0 to 1) of the likely range, and over
+    /// the visible hemisphere (section 5.1 of the paper). Where depths may lie beyond that range, one plane in
+    /// [`OUTER_DRAWS`] does, nearer and farther ones alike.
     #[inline(always)]
     pub(super) fn random(problem: &Problem, ray: Vec3, random: &mut Random, part: (f32, f32)) -> FoodSource {
         let share = part.0 + (part.1 - part.0) * random.unit();
-        let (nearest, farthest) = (1.0 / problem.range.near, 1.0 / problem.range.far);
+        let (likely, range) = (&problem.likely_range, &problem.range);
+        let (mut nearest, mut farthest) = (1.0 / likely.near, 1.0 / likely.far);
+        if range != likely && random.unit() * OUTER_DRAWS < 1.0 {
+            (nearest, farthest) = match random.unit() < 0.5 {
+                true => (farthest, 1.0 / range.far),
+                false => (1.0 / range.near, nearest),
+            };
+        }
         let inverse_depth = farthest + (nearest - farthest) * share;
         let depth = problem.range.clamp(1.0 / inverse_depth);
         FoodSource::new(depth, random.facing_normal(ray))

@@ -14,8 +14,10 @@ pub(crate) struct Problem<'a> {
     pub inverse_focal: (f32, f32),
     /// cx and cy, in px.
     pub principal: (f32, f32),
-    /// Range of the depths that are searched.
+    /// Range that depths are limited to.
     pub range: SearchRange,
+    /// The part of it in which most surfaces are; all of it unless a caller narrows it.
+    pub likely_range: SearchRange,
     /// The source views, in the order of the reference view's source list.
     pub sources: Vec<Source<'a>>,
 }
@@ -43,6 +45,7 @@ impl<'a> Problem<'a> {
             inverse_focal: ((1.0 / camera.fx) as f32, (1.0 / camera.fy) as f32),
             principal: (camera.cx as f32, camera.cy as f32),
             range: range.into(),
+            likely_range: range.into(),
             sources: Vec::new(),
         }
     }

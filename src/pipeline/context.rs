@@ -98,8 +98,9 @@ impl RunContext {
 
     /// A view and its sources with their published surfaces.
     pub(super) fn problem<'b>(&'b self, at: Place, surfaces: PublishedSurfaces<'b>) -> Problem<'b> {
-        let ScaledView { camera, image, range, .. } = self.scaled(at);
+        let ScaledView { camera, image, range, likely_range, .. } = self.scaled(at);
         let mut problem = Problem::new(camera, image, *range);
+        problem.likely_range = (*likely_range).into();
         for (&source, surface) in self.sources(at.view).iter().zip(surfaces.0) {
             let ScaledView { camera: other, image, .. } = self.scaled(Place { view: source as usize, ..at });
             problem.sources.push(Source::new(camera, other, image, surface));

@@ -81,6 +81,7 @@ mod tests {
             image: world.images[0].clone(),
             mask: Some(mask),
             range: RANGE,
+            likely_range: RANGE,
         };
         assert_eq!(classify(&view, &map.planes, &confidence, 2), expected);
         // With a single source no pixel can be validated, for this reason.

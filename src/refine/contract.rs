@@ -7,6 +7,7 @@ use crate::image::{PackedImage, Picture};
 use crate::matching::Problem;
 use crate::parallel::JoinedPool;
 use crate::scene::PixelEstimate;
+use crate::simd::SimdLevel;
 use crate::testing::{self, RANGE};
 use glam::Vec3;
 

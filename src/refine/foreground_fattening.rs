@@ -257,6 +257,7 @@ mod tests {
     use super::*;
     use crate::geometry::{Camera, DepthRange};
     use crate::image::{PackedImage, Picture};
+    use crate::simd::SimdLevel;
     use glam::{DMat3, DVec3};
 
     const SIZE: (u32, u32) = (48, 32);

@@ -12,7 +12,7 @@
 
 use super::stencil::{BilateralStencil, GrayWeights, Stencil};
 use super::{Domain, Filter, FilteredView};
-use crate::geometry::{Grid, PlaneHypothesis, SlantedPlane};
+use crate::geometry::{Grid, PlaneHypothesis, Position, SlantedPlane};
 use crate::scene::{PixelEstimate, validated_planes};
 use glam::Vec3;
 use rayon::prelude::*;
@@ -24,9 +24,13 @@ const RADIUS: i32 = 4;
 const SPATIAL_SIGMA: f32 = 2.7;
 /// Difference of gray values (0 to 255) with weight 1 / sqrt(e): a few deviations of a photograph's noise.
 const GRAY_SIGMA: f32 = 6.0;
-/// Neighbors whose gray value differs so much that their weight is below are another surface: the planes at a
-/// skyline say nothing about the sky.
-const MIN_GRAY_WEIGHT: f32 = 1e-3;
+/// Smallest weight of a difference of gray values: where all neighbors differ, the distance decides.
+const MIN_GRAY_WEIGHT: f32 = 1e-6;
+/// Largest difference of gray values within a surface.
+const MAX_GRAY_DIFFERENCE: u8 = 18;
+/// A pixel that differs from all planes around it, and has the gray value of more than this fraction of its
+/// neighborhood, where there is none, is no gap: the planes at a skyline say nothing about the sky.
+const MAX_OPEN_FRACTION: f32 = 0.4;
 /// Relative difference of inverse depths below which two neighbors are on the same surface; equal to the
 /// largest error of depth that the default check tolerates.
 const SAME_SURFACE: f32 = 0.01;
@@ -99,16 +103,32 @@ impl Surfaces<'_> {
                 let plane = &self.planes[neighbor.pixel];
                 let (dx, dy) = neighbor.offset;
                 let inverse_depth = plane.inverse_depth_at(-dx as f32, -dy as f32);
-                (neighbor.weight > 0.0 && plane.inverse_depth > 0.0 && inverse_depth > 0.0).then_some(
-                    Prediction {
-                        inverse_depth,
-                        normal: self.estimates[neighbor.pixel].normal,
-                        weight: neighbor.weight,
-                    },
-                )
+                (plane.inverse_depth > 0.0 && inverse_depth > 0.0).then_some(Prediction {
+                    inverse_depth,
+                    normal: self.estimates[neighbor.pixel].normal,
+                    weight: neighbor.weight,
+                })
             })
             .collect();
-        heaviest_surface(&predictions).filter(|&plane| view.is_usable(plane, position))
+        heaviest_surface(&predictions)
+            .filter(|&plane| view.is_usable(plane, position) && !self.is_beside_gap(view, position))
+    }
+
+    /// Whether a pixel belongs to a wide region without planes beside a surface of another gray value.
+    fn is_beside_gap(&self, view: &FilteredView, position: Position) -> bool {
+        let gray = |(x, y): Position| view.image.gray(x, y);
+        let (mut open, mut count) = (0, 0);
+        for neighbor in self.stencil.neighbors(view.image, position) {
+            let is_similar =
+                gray(self.grid.position(neighbor.pixel)).abs_diff(gray(position)) <= MAX_GRAY_DIFFERENCE;
+            match self.planes[neighbor.pixel].inverse_depth > 0.0 {
+                true if is_similar => return false,
+                true => {}
+                false => open += usize::from(is_similar),
+            }
+            count += 1;
+        }
+        open as f32 > MAX_OPEN_FRACTION * count as f32
     }
 }
 
@@ -138,6 +158,7 @@ mod tests {
     use super::*;
     use crate::geometry::{Camera, DepthRange};
     use crate::image::{PackedImage, Picture};
+    use crate::simd::SimdLevel;
     use crate::testing::{self, RANGE};
 
     const SIZE: (u32, u32) = (40, 30);
@@ -204,6 +225,16 @@ mod tests {
         let gray = |pixel| if pixel == gap { 255 } else { 0 };
         let filled = fill(gray, RANGE, &wall(|x, y| (x, y) == (20, 14)));
         assert_filled(filled[gap], testing::depth(&camera(), gap), testing::normal(&camera()));
+    }
+
+    #[test]
+    fn a_wide_region_of_another_gray_value_gets_no_plane_of_the_surface_beside_it() {
+        let is_sky = |x: usize| x >= 20;
+        let gray = |pixel| if is_sky(GRID.position(pixel).0) { 240 } else { 80 };
+        assert!(fill(gray, RANGE, &wall(|x, _| is_sky(x))).iter().all(Option::is_none));
+        let strip = |x: usize, y: usize| x == 20 && y > 3;
+        let narrow = |pixel| if strip(GRID.position(pixel).0, GRID.position(pixel).1) { 240 } else { 80 };
+        assert!(fill(narrow, RANGE, &wall(strip))[GRID.index((20, 15))].is_some());
     }
 
     #[test]

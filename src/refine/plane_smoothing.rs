@@ -208,6 +208,7 @@ mod tests {
     use crate::ambc::Random;
     use crate::geometry::{Camera, DepthRange, MIN_FACING};
     use crate::image::{PackedImage, Picture};
+    use crate::simd::SimdLevel;
     use crate::testing::{self, RANGE};
 
     const SIZE: (u32, u32) = (44, 36);

@@ -11,10 +11,16 @@ const RANGE_PERCENTILES: (f64, f64) = (0.01, 0.99);
 /// depth: doubling the largest depth adds little to it.
 const RANGE_WIDENING: (f64, f64) = (0.75, 2.0);
 
+/// Surfaces without any sparse point may be farther away still: factors of a derived range within which a
+/// small part of the random planes is drawn, and depths are kept.
+const OUTER_WIDENING: (f64, f64) = (0.7, 4.0);
+
 /// The depth ranges of all views.
 pub(super) struct DepthRanges {
-    /// One for each view.
+    /// One for each view: where most surfaces are.
     pub ranges: Vec<DepthRange>,
+    /// One for each view: where any may be.
+    pub outer: Vec<DepthRange>,
     /// A sentence for each view whose range is neither its own nor that of points it saw; a single one where
     /// no point has a track, as this holds for all views then.
     pub warnings: Vec<String>,
@@ -62,7 +68,7 @@ pub(super) fn depth_ranges(views: &[View], points: &[SparsePoint]) -> Result<Dep
             points.len()
         ));
     }
-    let mut ranges = Vec::with_capacity(views.len());
+    let (mut ranges, mut outer) = (Vec::with_capacity(views.len()), Vec::with_capacity(views.len()));
     for (view, known) in views.iter().zip(&known) {
         let name = &view.name;
         let range = known.as_ref().map(Known::range).or(union).ok_or_else(|| unknown(name, points.len()))?;
@@ -80,8 +86,9 @@ pub(super) fn depth_ranges(views: &[View], points: &[SparsePoint]) -> Result<Dep
             Some(_) => {}
         }
         ranges.push(range);
+        outer.push(if view.depth_range.is_some() { range } else { widened(range) });
     }
-    Ok(DepthRanges { ranges, warnings })
+    Ok(DepthRanges { ranges, outer, warnings })
 }
 
 /// The range of the points that a view saw or, where it saw none, of those that project into its image.
@@ -111,6 +118,12 @@ fn range_of_depths(name: &str, mut depths: Vec<f64>) -> Result<Option<DepthRange
         far: percentile(RANGE_PERCENTILES.1) * RANGE_WIDENING.1,
     };
     range.check(&format!("depth range of {name} from its sparse points")).map(|()| Some(range))
+}
+
+/// The range beyond a derived one, as far as it is representable.
+fn widened(range: DepthRange) -> DepthRange {
+    let wide = DepthRange { near: range.near * OUTER_WIDENING.0, far: range.far * OUTER_WIDENING.1 };
+    if wide.check("range").is_ok() { wide } else { range }
 }
 
 fn union(ranges: impl Iterator<Item = DepthRange>) -> Option<DepthRange> {

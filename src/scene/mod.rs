@@ -50,6 +50,7 @@ pub struct Scene {
     views: Vec<View>,
     points: Vec<SparsePoint>,
     depth_ranges: Vec<DepthRange>,
+    outer_ranges: Vec<DepthRange>,
     warnings: Vec<String>,
 }
 
@@ -87,8 +88,9 @@ impl Scene {
                 return Err(Error::argument(format!("points[{index}].views"), view, expected));
             }
         }
-        let DepthRanges { ranges: depth_ranges, warnings } = depth_ranges(&views, &points)?;
-        Ok(Scene { views, points, depth_ranges, warnings })
+        let DepthRanges { ranges: depth_ranges, outer: outer_ranges, warnings } =
+            depth_ranges(&views, &points)?;
+        Ok(Scene { views, points, depth_ranges, outer_ranges, warnings })
     }
 
     /// Returns the views and points, to change them.
@@ -106,9 +108,15 @@ impl Scene {
         &self.points
     }
 
-    /// The depth range of one view.
+    /// The depth range of one view. Beyond one that is derived a small part of the search goes on, to 0.7
+    /// times its near and 4 times its far end: surfaces may have no sparse points.
     pub fn depth_range(&self, view: usize) -> DepthRange {
         self.depth_ranges[view]
+    }
+
+    /// The range that depths of one view are limited to.
+    pub(crate) fn outer_range(&self, view: usize) -> DepthRange {
+        self.outer_ranges[view]
     }
 
     /// A sentence for each view whose depth range is neither its own nor that of sparse points it saw, and so

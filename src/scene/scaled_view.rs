@@ -3,7 +3,7 @@
 use crate::geometry::Camera;
 use crate::geometry::DepthRange;
 use crate::image::{PackedImage, Picture, halve_mask};
-use crate::scene::{Scene, View};
+use crate::scene::Scene;
 
 /// A view reduced to one scale.
 #[derive(Debug, Clone)]
@@ -14,17 +14,17 @@ pub(crate) struct ScaledView {
     pub image: PackedImage,
     /// `true` where a depth is estimated: where the mask is set in any of the pixels of full size.
     pub mask: Option<Vec<bool>>,
-    /// The depth range of the search.
+    /// The range that depths are limited to.
     pub range: DepthRange,
+    /// The part of it in which most surfaces are.
+    pub likely_range: DepthRange,
 }
 
 impl ScaledView {
     /// The view of a scene with this index, its image reduced by this power of two.
     pub(crate) fn of(scene: &Scene, index: usize, downscale: u32) -> ScaledView {
-        ScaledView::new(&scene.views()[index], scene.depth_range(index), downscale)
-    }
-
-    fn new(view: &View, range: DepthRange, downscale: u32) -> ScaledView {
+        let view = &scene.views()[index];
+        let (range, likely_range) = (scene.outer_range(index), scene.depth_range(index));
         let mut camera = view.camera;
         let mut halved: Option<Picture> = None;
         let mut mask = view.mask.clone();
@@ -33,13 +33,15 @@ impl ScaledView {
             mask = mask.map(|mask| halve_mask(&mask, &camera));
             camera = camera.halved();
         }
-        ScaledView { camera, image: PackedImage::new(halved.as_ref().unwrap_or(&view.picture)), mask, range }
+        let image = PackedImage::new(halved.as_ref().unwrap_or(&view.picture));
+        ScaledView { camera, image, mask, range, likely_range }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::View;
     use glam::{DMat3, DVec3};
 
     /// Two views of 5 x 3 pixels whose masks are set in one pixel only.

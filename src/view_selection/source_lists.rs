@@ -80,7 +80,8 @@ impl SourceLists {
     /// Adds the list of the next view, with a warning where it is too short for any pixel to be validated.
     fn add(&mut self, view: &View, list: Vec<u32>, options: &Options) {
         let needed = options.check.min_consistent_views as usize;
-        if (1..needed).contains(&list.len()) {
+        let is_few = list.len() <= options.check.few_views as usize;
+        if (1..needed).contains(&list.len()) && !is_few {
             self.warnings.push(format!(
                 "{} has {} source view(s), but {needed} must agree with a depth: none of its pixels can be \
                  validated",

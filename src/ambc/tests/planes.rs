@@ -30,6 +30,22 @@ fn random_planes_fill_their_stratum_of_inverse_depth_and_face_the_camera() {
 }
 
 #[test]
+fn one_random_plane_in_16_lies_beyond_a_likely_range_that_is_narrower() {
+    let world = World::five();
+    let mut problem = world.problem();
+    problem.likely_range.near = 3.0;
+    problem.likely_range.far = 6.0;
+    let ray = problem.ray(3.0, 25.0);
+    let mut random = Random::new(8, 9);
+    let depths: Vec<f32> =
+        (0..16000).map(|_| FoodSource::random(&problem, ray, &mut random, (0.0, 1.0)).depth).collect();
+    let count = |is_there: &dyn Fn(f32) -> bool| depths.iter().filter(|&&depth| is_there(depth)).count();
+    assert!((400..600).contains(&count(&|depth| depth < 3.0)));
+    assert!((400..600).contains(&count(&|depth| depth > 6.0)));
+    assert!(depths.iter().all(|&depth| problem.range.contains(depth)));
+}
+
+#[test]
 fn a_plane_transferred_to_another_pixel_is_the_same_plane() {
     let world = World::five();
     let problem = world.problem();

@@ -92,3 +92,40 @@ pub(crate) fn halos(image: &PackedImage, has_no_evidence: &[bool]) -> Vec<u32> {
     halo.sort_unstable();
     halo
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Picture;
+
+    const GRID: Grid = Grid { width: 60, height: 40 };
+
+    /// The rows of the halo in column 30 below a region of 20 rows, with gray values by row.
+    fn halo_below(gray: impl Fn(usize) -> u8, rows: usize) -> Vec<usize> {
+        let grays = (0..GRID.pixels()).map(|pixel| gray(GRID.position(pixel).1)).collect();
+        let image = PackedImage::new(&Picture::from_gray(60, 40, grays).unwrap());
+        let region: Vec<bool> = (0..GRID.pixels()).map(|pixel| GRID.position(pixel).1 < rows).collect();
+        let positions = halos(&image, &region).into_iter().map(|pixel| GRID.position(pixel as usize));
+        positions.filter(|position| position.0 == 30).map(|position| position.1).collect()
+    }
+
+    #[test]
+    fn a_halo_ends_where_the_gray_value_is_nearer_to_that_of_the_surface() {
+        // The blur of the edge goes from row 23 to row 27.
+        let gray = |row: usize| 240 - 32 * (row.clamp(22, 27) - 22) as u8;
+        let halo = halo_below(gray, 20);
+        assert_eq!(halo, (20..24).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_halo_is_no_wider_than_a_window_reaches_and_small_regions_have_none() {
+        assert_eq!(halo_below(|_| 200, 20), (20..32).collect::<Vec<_>>());
+        assert!(halo_below(|_| 200, 6).is_empty(), "360 pixels");
+    }
+
+    #[test]
+    fn a_surface_without_blur_keeps_all_its_pixels() {
+        let halo = halo_below(|row| if row < 20 { 240 } else { 80 }, 20);
+        assert!(halo.is_empty(), "{halo:?}");
+    }
+}

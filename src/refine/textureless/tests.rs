@@ -3,6 +3,7 @@ use super::*;
 use crate::ambc::Random;
 use crate::geometry::Camera;
 use crate::image::{PackedImage, Picture};
+use crate::simd::SimdLevel;
 use crate::testing::{self, RANGE, World};
 use glam::Vec3;
 
