@@ -222,6 +222,10 @@
 //   fusion.min_confidence
 //       Smallest confidence of pixels that are fused.
 //       number, 0 to 1, probability; default: 0
+//   fusion.compensate_exposure
+//       Multiply the colors of each photograph by a factor for each channel, so that photographs of different
+//       exposure or white balance agree on the points they share.
+//       switch, true or false; default: true, paper: false
 // END OPTIONS
 #ifndef SKEP_OPTIONS_HPP
 #define SKEP_OPTIONS_HPP

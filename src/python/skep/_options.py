@@ -219,6 +219,10 @@ class Options(Mapping[str, Value]):
     (number, 0 to 1, fraction of the views; default: 0.5, paper: 0)"""
     fusion_min_confidence: float
     """Smallest confidence of pixels that are fused. (number, 0 to 1, probability; default: 0)"""
+    fusion_compensate_exposure: bool
+    """Multiply the colors of each photograph by a factor for each channel, so that photographs of different
+    exposure or white balance agree on the points they share. (switch, true or false; default: true, paper:
+    false)"""
     # END OPTIONS
 
     def __init__(self, preset: Literal["default", "fast", "paper"] = "default", **values: Value) -> None:
