@@ -15,8 +15,6 @@ const STEP: u32 = 8;
 const USABLE: std::ops::RangeInclusive<u8> = 8..=247;
 /// Fewest points that a pair of views is compared by.
 const MIN_POINTS: usize = 30;
-/// Weight of gains of 1, as a fraction of that of the pairs.
-const PRIOR: f64 = 1e-3;
 /// Sweeps of the Gauss-Seidel iteration.
 const SWEEPS: usize = 200;
 
@@ -81,10 +79,16 @@ fn solve(views: usize, pairs: &[Pair]) -> Vec<[f64; 3]> {
                     let wanted = |&(other, points, ratio): &(usize, f64, [f64; 3])| {
                         points * (gains[other][channel] + ratio[channel])
                     };
-                    others.iter().map(wanted).sum::<f64>() / (weights * (1.0 + PRIOR))
+                    others.iter().map(wanted).sum::<f64>() / weights
                 });
             }
         }
+    }
+    let compared = || (0..views).filter(|&view| !by_view[view].is_empty());
+    for channel in 0..3 {
+        let mean =
+            compared().map(|view| gains[view][channel]).sum::<f64>() / compared().count().max(1) as f64;
+        compared().for_each(|view| gains[view][channel] -= mean);
     }
     gains
 }
@@ -99,8 +103,8 @@ mod tests {
             |first, second, ratio: f64| Pair { views: [first, second], points: 100.0, ratio: [ratio; 3] };
         let gains = solve(4, &[pair(0, 1, 0.2), pair(1, 2, -0.1)]);
         let difference = |first: usize, second: usize| gains[first][0] - gains[second][0];
-        assert!((difference(0, 1) + 0.2).abs() < 2e-3 && (difference(1, 2) - 0.1).abs() < 2e-3, "{gains:?}");
-        assert!((gains[0][0] + gains[1][0] + gains[2][0]).abs() < 0.01);
+        assert!((difference(0, 1) + 0.2).abs() < 1e-6 && (difference(1, 2) - 0.1).abs() < 1e-6, "{gains:?}");
+        assert!((gains[0][0] + gains[1][0] + gains[2][0]).abs() < 1e-6);
         assert_eq!(gains[3], [0.0; 3]);
     }
 }

@@ -290,7 +290,10 @@ fn a_view_without_overlap_gives_a_warning() {
 fn a_view_with_fewer_sources_than_must_agree_gives_a_warning() {
     let options = changed(ten_to_thirty(), |o| {
         o.check.min_consistent_views = 2;
+        o.check.few_views = 0;
     });
+    let result = lists(&around(&[0.0, 15.0]), &[], &changed(options.clone(), |o| o.check.few_views = 1));
+    assert!(result.warnings.is_empty(), "a single view suffices: {:?}", result.warnings);
     let result = lists(&around(&[0.0, 15.0]), &[], &options);
     assert_eq!(result.lists, [vec![1], vec![0]]);
     assert_eq!(result.warnings.len(), 2, "{:?}", result.warnings);

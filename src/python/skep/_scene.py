@@ -158,7 +158,10 @@ class Scene:
         return take_text(lambda *out: lib.skep_scene_get_name(self._handle, view, *out))
 
     def depth_range(self, view: int) -> tuple[float, float]:
-        """The depth range that a run searches: the view's own, or the one derived from the sparse points."""
+        """The depth range that a run searches: the view's own, or the one derived from the sparse points.
+
+        Beyond a derived one a small part of the search goes on, to 0.7 times its near and 4 times its far end.
+        """
         near, far = ffi.new("double *"), ffi.new("double *")
         check(lib.skep_scene_get_depth_range(self._handle, index(view, "view"), near, far))
         return near[0], far[0]
