@@ -7,6 +7,7 @@
 
 use super::source::{Comparison, Source};
 use super::{FusionView, Reference};
+use glam::DVec3;
 use rayon::prelude::*;
 
 /// Every pixel in so many rows and columns is compared.
@@ -18,18 +19,18 @@ const MIN_POINTS: usize = 30;
 /// Sweeps of the Gauss-Seidel iteration.
 const SWEEPS: usize = 200;
 
-/// Logarithms of the ratios of the colors of two views.
+/// Two views and the logarithms of the ratios of their colors.
 struct Pair {
     views: [usize; 2],
     points: f64,
-    ratio: [f64; 3],
+    ratio: DVec3,
 }
 
 /// Factors of red, green and blue for each view.
-pub(super) fn gains(views: &[FusionView], references: &[Reference]) -> Vec<[f64; 3]> {
+pub(super) fn gains(views: &[FusionView], references: &[Reference]) -> Vec<DVec3> {
     let pairs: Vec<Pair> =
         references.par_iter().flat_map_iter(|reference| pairs_of(views, reference)).collect();
-    solve(views.len(), &pairs).into_iter().map(|gain| gain.map(f64::exp)).collect()
+    solve(views.len(), &pairs).into_iter().map(DVec3::exp).collect()
 }
 
 fn pairs_of(views: &[FusionView], reference: &Reference) -> Vec<Pair> {
@@ -58,38 +59,30 @@ fn pair(views: &[FusionView], reference: &Reference, source: &Source) -> Option<
     (points >= MIN_POINTS).then(|| Pair {
         views: [reference.index, source.index as usize],
         points: points as f64,
-        ratio: ratios.map(super::average::median),
+        ratio: DVec3::from_array(ratios.map(super::average::median)),
     })
 }
 
 /// The logarithms of the gains.
-fn solve(views: usize, pairs: &[Pair]) -> Vec<[f64; 3]> {
+fn solve(views: usize, pairs: &[Pair]) -> Vec<DVec3> {
     let mut by_view = vec![Vec::new(); views];
     for pair in pairs {
         let [first, second] = pair.views;
-        by_view[first].push((second, pair.points, pair.ratio.map(|ratio| -ratio)));
+        by_view[first].push((second, pair.points, -pair.ratio));
         by_view[second].push((first, pair.points, pair.ratio));
     }
-    let mut gains = vec![[0.0; 3]; views];
+    let compared: Vec<usize> = (0..views).filter(|&view| !by_view[view].is_empty()).collect();
+    let mut gains = vec![DVec3::ZERO; views];
     for _ in 0..SWEEPS {
-        for (view, others) in by_view.iter().enumerate() {
-            let weights: f64 = others.iter().map(|(_, points, _)| points).sum();
-            if weights > 0.0 {
-                gains[view] = std::array::from_fn(|channel| {
-                    let wanted = |&(other, points, ratio): &(usize, f64, [f64; 3])| {
-                        points * (gains[other][channel] + ratio[channel])
-                    };
-                    others.iter().map(wanted).sum::<f64>() / weights
-                });
-            }
+        for &view in &compared {
+            let points: f64 = by_view[view].iter().map(|(_, points, _)| points).sum();
+            let wanted: DVec3 =
+                by_view[view].iter().map(|&(other, points, ratio)| points * (gains[other] + ratio)).sum();
+            gains[view] = wanted / points;
         }
     }
-    let compared = || (0..views).filter(|&view| !by_view[view].is_empty());
-    for channel in 0..3 {
-        let mean =
-            compared().map(|view| gains[view][channel]).sum::<f64>() / compared().count().max(1) as f64;
-        compared().for_each(|view| gains[view][channel] -= mean);
-    }
+    let mean = compared.iter().map(|&view| gains[view]).sum::<DVec3>() / compared.len().max(1) as f64;
+    compared.iter().for_each(|&view| gains[view] -= mean);
     gains
 }
 
@@ -99,12 +92,15 @@ mod tests {
 
     #[test]
     fn gains_undo_the_ratios_of_a_chain_of_views_and_are_1_without_pairs() {
-        let pair =
-            |first, second, ratio: f64| Pair { views: [first, second], points: 100.0, ratio: [ratio; 3] };
+        let pair = |first, second, ratio: f64| Pair {
+            views: [first, second],
+            points: 100.0,
+            ratio: DVec3::splat(ratio),
+        };
         let gains = solve(4, &[pair(0, 1, 0.2), pair(1, 2, -0.1)]);
-        let difference = |first: usize, second: usize| gains[first][0] - gains[second][0];
+        let difference = |first: usize, second: usize| gains[first].x - gains[second].x;
         assert!((difference(0, 1) + 0.2).abs() < 1e-6 && (difference(1, 2) - 0.1).abs() < 1e-6, "{gains:?}");
-        assert!((gains[0][0] + gains[1][0] + gains[2][0]).abs() < 1e-6);
-        assert_eq!(gains[3], [0.0; 3]);
+        assert!((gains[0] + gains[1] + gains[2]).length() < 1e-6);
+        assert_eq!(gains[3], DVec3::ZERO);
     }
 }

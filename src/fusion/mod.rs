@@ -109,7 +109,7 @@ pub fn fuse(views: &[FusionView], options: &FusionOptions, progress: ProgressFn)
         (0..views.len()).map(|index| Reference::new(views, index, options, &used)).collect();
     let gains = match options.compensate_exposure {
         true => exposure::gains(views, &references),
-        false => vec![[1.0; 3]; views.len()],
+        false => vec![DVec3::ONE; views.len()],
     };
     let mut cloud = PointCloud::default();
     for (index, reference) in references.iter().enumerate() {
@@ -244,7 +244,7 @@ impl<'a> Reference<'a> {
     }
 
     /// The points that start in a row; `gains` are the factors of the colors of each view.
-    fn fuse_row(&self, row: u32, gains: &[[f64; 3]]) -> PointCloud {
+    fn fuse_row(&self, row: u32, gains: &[DVec3]) -> PointCloud {
         let view = &self.views[self.index];
         let first = row as usize * view.camera.width as usize;
         let mut points = PointCloud::default();
@@ -265,7 +265,7 @@ impl<'a> Reference<'a> {
             point_views.extend(members.iter().map(|member| member.view));
             let (position, normal, color) = average(&members, |member| {
                 let view = member.view as usize;
-                let color = |rgb| DVec3::from_array(rgb) * DVec3::from_array(gains[view]);
+                let color = |rgb| DVec3::from_array(rgb) * gains[view];
                 self.views[view].picture.map(|picture| color(picture.rgb(member.pixel).map(f64::from)))
             });
             points.positions.push((view.camera.center() + position).to_array());
