@@ -145,10 +145,11 @@ int main() {
         EXPECT(within(surface, {0.0015, 0.012}));
 
         // With its own settings COLMAP makes one point of all that lies within two pixels: fewer
-        // points, far apart.
+        // points, far apart. It follows chains of pixels from view to view, so some of its points
+        // have no reference that enough views agree with.
         colmap::mvs::StereoFusionOptions defaults;
         defaults.num_threads = 1;
-        const Bounds coarse = {0.12, 1, {0.008, 0.025}, {0.002, 0.012}};
+        const Bounds coarse = {0.12, 1, {0.008, 0.035}, {0.002, 0.012}};
         compare("COLMAP's settings", ours, fuse_with_colmap(workspace.folder, defaults), coarse);
 
         // With settings equivalent to ours the clouds differ by little more than the half pixel by
