@@ -33,8 +33,8 @@ impl FoodSource {
     }
 
     /// A random plane: uniform in inverse depth within the given part (0 to 1) of the likely range, and over
-    /// the visible hemisphere (section 5.1 of the paper). Where depths may lie beyond that range, one plane in
-    /// [`OUTER_DRAWS`] does, nearer and farther ones alike.
+    /// the visible hemisphere (section 5.1 of the paper). Where depths may lie beyond that range, one plane
+    /// in [`OUTER_DRAWS`] does, nearer and farther ones alike.
     #[inline(always)]
     pub(super) fn random(problem: &Problem, ray: Vec3, random: &mut Random, part: (f32, f32)) -> FoodSource {
         let share = part.0 + (part.1 - part.0) * random.unit();

@@ -5,13 +5,16 @@
 //! both see. The gains `exp(g)` minimize `sum n (g_a - g_b + m)^2` over all pairs of `n` points each, and are
 //! 1 in the mean.
 
+use super::Reference;
 use super::source::{Comparison, Source};
-use super::{FusionView, Reference};
+use crate::error::Result;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// Every pixel in so many rows and columns is compared.
-const STEP: u32 = 8;
+/// Of so many rows and columns one is compared, of fewer in large images.
+const MIN_STEP: usize = 8;
+/// Pixels of a view that are compared, about.
+const MAX_SAMPLES: f64 = 20_000.0;
 /// Colors beyond are clipped, or mostly noise.
 const USABLE: std::ops::RangeInclusive<u8> = 8..=247;
 /// Fewest points that a pair of views is compared by.
@@ -26,24 +29,33 @@ struct Pair {
     ratio: DVec3,
 }
 
-/// Factors of red, green and blue for each view.
-pub(super) fn gains(views: &[FusionView], references: &[Reference]) -> Vec<DVec3> {
-    let pairs: Vec<Pair> =
-        references.par_iter().flat_map_iter(|reference| pairs_of(views, reference)).collect();
-    solve(views.len(), &pairs).into_iter().map(DVec3::exp).collect()
-}
-
-fn pairs_of(views: &[FusionView], reference: &Reference) -> Vec<Pair> {
-    reference.sources.iter().filter_map(|source| pair(views, reference, source)).collect()
+/// Factors of red, green and blue for each view; calls `before` before each reference view.
+///
+/// # Errors
+/// What `before` returns.
+pub(super) fn gains<'a>(
+    views: usize,
+    reference: impl Fn(usize) -> Reference<'a>,
+    before: impl Fn(usize) -> Result<()>,
+) -> Result<Vec<DVec3>> {
+    let mut pairs = Vec::new();
+    for index in 0..views {
+        before(index)?;
+        let reference = reference(index);
+        pairs.par_extend(reference.sources.par_iter().filter_map(|source| pair(&reference, source)));
+    }
+    Ok(solve(views, &pairs).into_iter().map(DVec3::exp).collect())
 }
 
 /// Compares the colors of the reference and a source where they see the same surface.
-fn pair(views: &[FusionView], reference: &Reference, source: &Source) -> Option<Pair> {
+fn pair(reference: &Reference, source: &Source) -> Option<Pair> {
+    let views = reference.views;
     let camera = views[reference.index].camera;
+    let step = MIN_STEP.max((camera.pixels() as f64 / MAX_SAMPLES).sqrt() as usize);
     let own_picture = views[reference.index].picture?;
     let mut ratios: [Vec<f64>; 3] = Default::default();
-    for row in (0..camera.height).step_by(STEP as usize) {
-        for column in (0..camera.width).step_by(STEP as usize) {
+    for row in (0..camera.height).step_by(step) {
+        for column in (0..camera.width).step_by(step) {
             let Some((pixel, depth, start)) = reference.start((column, row)) else { continue };
             let Comparison::Consistent(other) = source.compare(pixel, depth, &start) else { continue };
             let (own, other) =

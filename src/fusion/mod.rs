@@ -105,15 +105,15 @@ pub fn fuse(views: &[FusionView], options: &FusionOptions, progress: ProgressFn)
         if progress(&at).is_break() { Err(Error::Cancelled) } else { Ok(()) }
     };
 
-    let references: Vec<Reference> =
-        (0..views.len()).map(|index| Reference::new(views, index, options, &used)).collect();
+    let reference = |index| Reference::new(views, index, options, &used);
     let gains = match options.compensate_exposure {
-        true => exposure::gains(views, &references),
+        true => exposure::gains(views.len(), reference, |index| report(index, 0))?,
         false => vec![DVec3::ONE; views.len()],
     };
     let mut cloud = PointCloud::default();
-    for (index, reference) in references.iter().enumerate() {
-        let height = views[index].camera.height;
+    for (index, view) in views.iter().enumerate() {
+        let reference = reference(index);
+        let height = view.camera.height;
         for top in (0..height).step_by(BAND_ROWS as usize) {
             report(index, rows_done)?;
             let rows = top..height.min(top + BAND_ROWS);
