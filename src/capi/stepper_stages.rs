@@ -305,14 +305,15 @@ pub unsafe extern "C" fn skep_stepper_next(
     })
 }
 
-/// Finishes a view after the last cycle. Four stages, in this order:
+/// Finishes a view after the last cycle. Five stages, in this order:
 ///
 ///   1. averaging of the validated planes with those of the source views (option
 ///      "refine.cross_view_averaging"); reads the published surfaces of the last cycle of the view's sources
 ///   2. gap filling from the surrounding planes (option "refine.fill_gaps")
 ///   3. check of the filled pixels against the planes of the source views as they were before averaging:
 ///      reads the checked planes of the last cycle of the view's sources; pixels that fail keep what they had
-///   4. classification: determines view set, cost and status of every pixel
+///   4. speckle removal: small islands of planes lose their validation (option "refine.max_speckle_size")
+///   5. classification: determines view set, cost and status of every pixel
 ///
 /// The estimates are not changed.
 ///

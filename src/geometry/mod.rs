@@ -4,6 +4,7 @@
 //! top-left pixel's center is (0, 0); depth is z in the camera frame.
 
 mod camera;
+mod components;
 mod depth_range;
 mod grid;
 mod padded_map;
@@ -12,6 +13,7 @@ mod relative_pose;
 mod view_set;
 
 pub use camera::Camera;
+pub(crate) use components::for_each_component;
 pub use depth_range::DepthRange;
 pub(crate) use depth_range::SearchRange;
 pub(crate) use grid::{Grid, Offset, Position};

@@ -235,6 +235,9 @@ options! {
         /// Fill small gaps from the surrounding planes after the last cycle, where the source views confirm
         /// them.
         fill_gaps: switch() "switch",
+        /// Largest number of pixels of a speckle after the last cycle: an island of validated planes that no
+        /// surface around it continues. Speckles lose their validation; 0 keeps them.
+        max_speckle_size: count(0 to 4294967295) "pixels",
     }
 
     /// Fusion: which pixels become points (section 6 of the paper).

@@ -91,6 +91,7 @@ impl Options {
                 smoothing_passes: 0,
                 cross_view_averaging: false,
                 fill_gaps: false,
+                max_speckle_size: 0,
             },
             fusion: FusionOptions {
                 depth_tolerance: 0.01,
@@ -186,6 +187,7 @@ impl Default for Options {
                 smoothing_passes: 1,
                 cross_view_averaging: true,
                 fill_gaps: true,
+                max_speckle_size: 30,
             },
             fusion: FusionOptions {
                 reprojection_tolerance: 1.25,

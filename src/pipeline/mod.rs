@@ -139,6 +139,7 @@ fn finish(
         let problem = context.problem(at(view), surfaces.of_sources(context.sources(view)));
         let mut planes = stages::average_across_views(context, &problem, &own);
         filled.write_to(&mut planes);
+        stages::remove_speckles(context, at(view), &mut planes);
         stages::classify(context, &problem, own, planes, &filled, &|units| advance(view, units))
     })?;
     Ok(results.into_vec())

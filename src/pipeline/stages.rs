@@ -19,6 +19,7 @@ use crate::refine::Filter;
 use crate::refine::foreground_fattening::CorrectFattening;
 use crate::refine::gap_filling::FillGaps;
 use crate::refine::plane_smoothing::SmoothPlanes;
+use crate::refine::speckles::RemoveSpeckles;
 use crate::refine::textureless::{FillTextureless, halos};
 use crate::scene::{PixelEstimate, PlaneMap, ScaledView, Scene, Verdict};
 use crate::view_selection::{ViewRules, select_sets};
@@ -356,6 +357,12 @@ pub(super) fn recheck(
         validated.then_some((pixel, PixelEstimate { consistent_views, validated, ..plane }))
     });
     Ok(FilledGaps(confirmed.collect()))
+}
+
+/// Takes the validation from small islands of planes that no surface around them continues.
+pub(super) fn remove_speckles(context: &RunContext, at: Place, planes: &mut [PixelEstimate]) {
+    let filter = RemoveSpeckles { max_size: context.options.refine.max_speckle_size };
+    filter.apply(&context.filtered_view(at), planes);
 }
 
 /// Determines view set, cost (mean of 1 - NCC), confidence and status of every pixel; filled planes of pixels

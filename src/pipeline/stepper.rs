@@ -187,7 +187,7 @@ impl Stepper {
     }
 
     /// The result of a view after the last cycle: averages validated planes across views, fills small gaps
-    /// where the sources confirm them, and determines view set, cost (mean of 1 - NCC) and status of every
+    /// where the sources confirm them, removes speckles, and determines view set, cost (mean of 1 - NCC) and status of every
     /// pixel. Reads the published surfaces of the view's sources, and their checked planes.
     ///
     /// # Errors
@@ -209,6 +209,7 @@ impl Stepper {
         let sources = SourcePlanes::new(self.sources(view), known);
         let filled = stages::recheck(&self.0, &problem, filled, sources, &advance)?;
         filled.write_to(&mut planes);
+        stages::remove_speckles(&self.0, at, &mut planes);
         stages::classify(&self.0, &problem, own.clone(), planes, &filled, &advance)
     }
 

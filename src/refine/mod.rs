@@ -6,6 +6,7 @@
 //! | [`CorrectFattening`] | after a check that may be the last of its scale | validated planes |
 //! | [`SmoothPlanes`] | after every check | validated planes |
 //! | [`FillGaps`] | after the last cycle | planes that are not validated |
+//! | [`RemoveSpeckles`] | after gap filling | validated planes, which lose their validation |
 //!
 //! All of them implement [`Filter`] and pass the test in `contract.rs`.
 //!
@@ -13,10 +14,12 @@
 //! [`CorrectFattening`]: foreground_fattening::CorrectFattening
 //! [`SmoothPlanes`]: plane_smoothing::SmoothPlanes
 //! [`FillGaps`]: gap_filling::FillGaps
+//! [`RemoveSpeckles`]: speckles::RemoveSpeckles
 
 pub(crate) mod foreground_fattening;
 pub(crate) mod gap_filling;
 pub(crate) mod plane_smoothing;
+pub(crate) mod speckles;
 pub(crate) mod stencil;
 pub(crate) mod textureless;
 

@@ -2,7 +2,7 @@
 //! outline and match by what is beyond, up to half a window's width into the region. Such pixels have the
 //! gray value of the region, or, in the glow of its edge, one nearer to it than to that of the surface.
 
-use crate::geometry::Grid;
+use crate::geometry::{Grid, for_each_component};
 use crate::image::{PackedImage, blurred, deviation};
 use glam::Vec2;
 
@@ -58,31 +58,23 @@ fn ahead(grid: Grid, origin: usize, pixel: usize) -> Option<usize> {
 pub(crate) fn halos(image: &PackedImage, has_no_evidence: &[bool]) -> Vec<u32> {
     let grid = Grid { width: image.width, height: image.height };
     let mut is_taken = has_no_evidence.to_vec();
-    let mut is_traced = vec![false; grid.pixels()];
     let neighbors = |pixel| grid.four_neighbors(pixel).into_iter().flatten();
+    let is_at_rim = |&&pixel: &&usize| neighbors(pixel).any(|other| !has_no_evidence[other]);
+    let start = |&pixel: &usize| {
+        let gray = region_gray(image, has_no_evidence, pixel);
+        Front { pixel, origin: pixel, gray }
+    };
     let mut front: Vec<Front> = Vec::new();
-    for first in 0..grid.pixels() {
-        if !has_no_evidence[first] || is_traced[first] {
-            continue;
-        }
-        is_traced[first] = true;
-        let mut region = vec![first];
-        let mut next = 0;
-        while next < region.len() {
-            for other in neighbors(region[next]) {
-                if has_no_evidence[other] && !std::mem::replace(&mut is_traced[other], true) {
-                    region.push(other);
-                }
+    for_each_component(
+        grid,
+        |pixel| has_no_evidence[pixel],
+        |_, _| true,
+        |region| {
+            if region.len() >= MIN_AREA {
+                front.extend(region.iter().filter(is_at_rim).map(start));
             }
-            next += 1;
-        }
-        if region.len() >= MIN_AREA {
-            let is_at_rim = |&&pixel: &&usize| neighbors(pixel).any(|other| !has_no_evidence[other]);
-            let start =
-                |&pixel| Front { pixel, origin: pixel, gray: region_gray(image, has_no_evidence, pixel) };
-            front.extend(region.iter().filter(is_at_rim).map(start));
-        }
-    }
+        },
+    );
     let mut halo = Vec::new();
     for _ in 0..MAX_WIDTH {
         let mut next = Vec::new();

@@ -1,6 +1,6 @@
 //! Connected textureless regions, their outlines, and the pixels around them.
 
-use crate::geometry::Grid;
+use crate::geometry::{Grid, for_each_component};
 use crate::image::{PackedImage, blurred, deviation};
 use crate::scene::PixelEstimate;
 
@@ -107,30 +107,17 @@ pub(super) fn is_open(planes: &[PixelEstimate], is_textureless: &[bool], pixel: 
 /// continue beyond its border may be a sky, and what surrounds a sky is in front of it.
 pub(super) fn find_enclosed(grid: Grid, is_textureless: &[bool]) -> Vec<bool> {
     let mut is_enclosed = vec![false; is_textureless.len()];
-    let mut is_traced = vec![false; is_textureless.len()];
-    for first in 0..is_textureless.len() {
-        if !is_textureless[first] || std::mem::replace(&mut is_traced[first], true) {
-            continue;
-        }
-        let mut connected = vec![first];
-        let (mut border_sides, mut next) = (0, 0);
-        while next < connected.len() {
-            for neighbor in grid.four_neighbors(connected[next]) {
-                match neighbor {
-                    Some(other)
-                        if is_textureless[other] && !std::mem::replace(&mut is_traced[other], true) =>
-                    {
-                        connected.push(other);
-                    }
-                    Some(_) => {}
-                    None => border_sides += 1,
-                }
-            }
-            next += 1;
-        }
-        let is_within = f64::from(border_sides) <= MAX_BORDER_SIDES * (connected.len() as f64).sqrt();
-        connected.into_iter().for_each(|pixel| is_enclosed[pixel] = is_within);
-    }
+    let border_sides = |&pixel: &usize| grid.four_neighbors(pixel).iter().filter(|side| side.is_none()).count();
+    for_each_component(
+        grid,
+        |pixel| is_textureless[pixel],
+        |_, _| true,
+        |pixels| {
+            let border_sides: usize = pixels.iter().map(border_sides).sum();
+            let is_within = border_sides as f64 <= MAX_BORDER_SIDES * (pixels.len() as f64).sqrt();
+            pixels.iter().for_each(|&pixel| is_enclosed[pixel] = is_within);
+        },
+    );
     is_enclosed
 }
 
