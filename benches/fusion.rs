@@ -20,7 +20,7 @@ fn fusion(criterion: &mut Criterion) {
             maps,
             status: None,
             confidence: None,
-            picture: Some(&view.picture),
+            picture: view.picture.decoded(),
             overlap,
         })
         .collect();

@@ -51,11 +51,17 @@ impl Patches {
             let homography = |(&(x, y), plane): (&(usize, usize), &SlantedPlane)| {
                 PatchHomography::of_plane(&pose, pose.at_infinity(x as f32, y as f32), plane)
             };
-            let image = PackedImage::new(&scene.views[view].picture);
+            let image = PackedImage::new(&scene.views[view].picture.load().unwrap());
             Source { image, pose, homographies: pixels.iter().zip(&planes).map(homography).collect() }
         };
         let sources = VIEWS.map(source).into();
-        Patches { window, reference: PackedImage::new(&view.picture), pixels, planes, sources }
+        Patches {
+            window,
+            reference: PackedImage::new(&view.picture.load().unwrap()),
+            pixels,
+            planes,
+            sources,
+        }
     }
 }
 

@@ -11,7 +11,7 @@ fn view(name: &str, center: DVec3, is_turned: bool) -> View {
     let rotation = DMat3::from_rotation_y(if is_turned { std::f64::consts::PI } else { 0.0 });
     let translation = -(rotation * center);
     let camera = Camera { width: 5, height: 5, fx: 8.0, fy: 8.0, cx: 2.0, cy: 2.0, rotation, translation };
-    let picture = Picture::from_gray(5, 5, vec![100; 25]).unwrap();
+    let picture = Picture::from_gray(5, 5, vec![100; 25]).unwrap().into();
     View { name: name.to_owned(), picture, camera, mask: None, depth_range: None, sources: None }
 }
 

@@ -31,7 +31,7 @@ fn fusion_views<'a>(made: &'a Procedural, maps: &'a [Maps], overlap: &'a [Vec<u3
         maps: &maps[index],
         status: None,
         confidence: None,
-        picture: Some(&made.views[index].picture),
+        picture: made.views[index].picture.decoded(),
         overlap: &overlap[index],
     };
     (0..maps.len()).map(view).collect()
@@ -231,7 +231,7 @@ fn colors_are_the_pictures_at_the_point_and_gray_without() {
         let view = &made.views[cloud.views.get(point)[0] as usize];
         let (pixel, _) = view.camera.project(DVec3::from_array(position)).unwrap();
         let (column, row) = view.camera.nearest_pixel(pixel).unwrap();
-        let seen = view.picture.rgb((row * view.camera.width + column) as usize);
+        let seen = view.picture.decoded().unwrap().rgb((row * view.camera.width + column) as usize);
         difference += (0..3).map(|c| f64::from(seen[c].abs_diff(cloud.colors[point][c]))).sum::<f64>() / 3.0;
     }
     assert!(difference / (cloud.positions.len() as f64) < 12.0, "{difference}");
@@ -433,10 +433,10 @@ fn a_pixel_that_became_part_of_a_point_starts_none() {
 fn photographs_of_different_exposure_agree_on_the_colors_of_their_points() {
     let mut made = procedural::plane_and_sphere();
     for (index, view) in made.views.iter_mut().enumerate() {
-        let (width, height) = (view.picture.width(), view.picture.height());
+        let (width, height) = view.picture.size();
         let gray = [100, 80, 120, 90, 110][index % 5];
         let grays = vec![gray; (width * height) as usize];
-        view.picture = skep::image::Picture::from_gray(width, height, grays).unwrap();
+        view.picture = skep::image::Picture::from_gray(width, height, grays).unwrap().into();
     }
     // Between the darkest and the brightest point: their sets of views differ.
     let spread = |compensate_exposure| {

@@ -80,7 +80,7 @@ fn pictures_of_a_point_are_similar_and_textured() {
         let gray = |view: u32| {
             let View { camera, picture, .. } = &scene.views[view as usize];
             let (column, row) = camera.nearest_pixel(camera.project(point.position).unwrap().0).unwrap();
-            f64::from(picture.gray()[(row * camera.width + column) as usize])
+            f64::from(picture.decoded().unwrap().gray()[(row * camera.width + column) as usize])
         };
         difference += (gray(point.views[0]) - gray(point.views[1])).abs();
         contrast += (gray(point.views[0]) - 127.5).abs();
@@ -108,7 +108,7 @@ fn every_view_has_four_views_with_a_useful_triangulation_angle() {
 fn the_panel_is_uniform_and_has_no_sparse_points() {
     let scene = procedural::textureless_panel();
     let mut panel = 0;
-    for (pixel, &gray) in scene.views[MIDDLE].picture.gray().iter().enumerate() {
+    for (pixel, &gray) in scene.views[MIDDLE].picture.decoded().unwrap().gray().iter().enumerate() {
         if scene.hit(MIDDLE, pixel).unwrap().surface == procedural::PANEL
             && !is_on_edge(&scene, MIDDLE, pixel)
         {

@@ -107,7 +107,7 @@ pub unsafe extern "C" fn skep_scene_add_view(
         let (scene, image, camera) =
             unsafe { (get(scene, "scene")?, get(image, "image")?, get(camera, "camera")?) };
         // SAFETY: as the header demands of the caller.
-        let picture = unsafe { image.picture("image") }?;
+        let picture = unsafe { image.picture("image") }?.into();
         let camera = camera.sized((image.width, image.height), "camera")?;
         let name = match name_or_null.is_null() {
             true => None,

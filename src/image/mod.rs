@@ -3,11 +3,13 @@
 mod blur;
 mod noise;
 mod packed_image;
+mod photograph;
 mod picture;
 mod pyramid;
 
 pub(crate) use blur::blurred;
 pub(crate) use noise::{Noise, deviation};
 pub use packed_image::PackedImage;
+pub use photograph::{Photograph, PictureSource};
 pub use picture::Picture;
 pub(crate) use pyramid::halve_mask;

@@ -27,6 +27,11 @@ impl PackedImage {
         PackedImage { width, height, taps, noise: Noise::estimate(picture) }
     }
 
+    /// Bytes that its pixels take in memory.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(self.taps.pairs())
+    }
+
     /// The gray value of a pixel.
     #[inline(always)]
     pub fn gray(&self, x: usize, y: usize) -> u8 {

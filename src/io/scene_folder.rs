@@ -69,7 +69,7 @@ pub fn read_scene(folder: &Path, depth_range: Option<DepthRange>) -> Result<Scen
     }
     let model = ColmapModel::read(&scene.sparse)?;
     let view = |image: super::ModelImage| {
-        let picture = scene.read_picture(&image.name, &image.camera)?;
+        let picture = scene.read_picture(&image.name, &image.camera)?.into();
         Ok(View { name: image.name, picture, camera: image.camera, mask: None, depth_range, sources: None })
     };
     let views = model.images.into_iter().map(view).collect::<Result<_>>()?;
@@ -91,7 +91,7 @@ pub fn write_scene(folder: &Path, scene: &Scene) -> Result<()> {
         }
     }
     for view in scene.views() {
-        write_picture(&folder.join("images").join(&view.name), &view.picture)?;
+        write_picture(&folder.join("images").join(&view.name), &view.picture.load()?)?;
     }
     let image = |view: &View| super::ModelImage { name: view.name.clone(), camera: view.camera };
     let images = scene.views().iter().map(image).collect();

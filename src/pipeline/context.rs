@@ -5,14 +5,16 @@ use super::cycle::{Cycle, CycleRecord, Place};
 use super::sources::PublishedSurfaces;
 use crate::cross_view::Donor;
 use crate::error::{Error, Result};
+use crate::image::PackedImage;
 use crate::matching::{Problem, Source, Window};
-use crate::options::Options;
+use crate::options::{Options, Scale};
 use crate::parallel::{Advance, Phase, Progress};
 use crate::refine::FilteredView;
-use crate::scene::{PixelEstimate, ScaledView, Scene};
+use crate::scene::{ImageCache, PixelEstimate, ScaledView, Scene};
 use crate::simd::SimdLevel;
 use crate::view_selection::{SourceLists, source_lists};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// What all stages of a run share.
 pub(super) struct RunContext {
@@ -25,25 +27,41 @@ pub(super) struct RunContext {
     cycles: Vec<Cycle>,
     /// By scale and view.
     scaled: Vec<Vec<ScaledView>>,
+    images: ImageCache,
+}
+
+/// The images of a view and of its sources on one scale.
+pub(super) struct ViewImages {
+    pub own: Arc<PackedImage>,
+    sources: Vec<Arc<PackedImage>>,
 }
 
 impl RunContext {
-    /// Reduces the images to all scales and chooses the source views; calls `advance` with 0 units before
-    /// each image.
+    /// Chooses the source views and keeps the images of all scales in memory; calls `advance` with 0 units
+    /// before each image.
     ///
     /// # Errors
-    /// An option out of its range, named; what `advance` returns.
+    /// An option out of its range, named; a photograph that cannot be decoded; what `advance` returns.
     pub(super) fn new(scene: &Scene, options: &Options, advance: Advance) -> Result<RunContext> {
+        let context = RunContext::with_image_limit(scene, options, usize::MAX)?;
+        context.images.fill(|| advance(0))?;
+        Ok(context)
+    }
+
+    /// Chooses the source views. Images are decoded when they are needed; those of up to `limit` bytes stay
+    /// in memory.
+    ///
+    /// # Errors
+    /// An option out of its range, named.
+    pub(super) fn with_image_limit(scene: &Scene, options: &Options, limit: usize) -> Result<RunContext> {
         options.check()?;
         let scales = &options.schedule.scales;
-        let mut scaled = Vec::new();
-        for scale in scales {
-            let views = (0..scene.views().len()).into_par_iter().map(|view| {
-                advance(0)?;
-                Ok(ScaledView::of(scene, view, scale.downscale))
-            });
-            scaled.push(views.collect::<Result<Vec<_>>>()?);
-        }
+        let views = || (0..scene.views().len()).into_par_iter();
+        let scaled =
+            |scale: &Scale| views().map(|view| ScaledView::of(scene, view, scale.downscale)).collect();
+        let scaled = scales.iter().map(scaled).collect();
+        let photographs = scene.views().iter().map(|view| view.picture.clone()).collect();
+        let downscales = scales.iter().map(|scale| scale.downscale).collect();
         Ok(RunContext {
             options: options.clone(),
             level: options.simd.unwrap_or_else(SimdLevel::detect),
@@ -52,6 +70,7 @@ impl RunContext {
             sources: source_lists(scene, options),
             cycles: Cycle::all(options),
             scaled,
+            images: ImageCache::new(photographs, downscales, limit),
         })
     }
 
@@ -90,19 +109,43 @@ impl RunContext {
         &self.scaled[self.cycles[at.cycle].scale_index][at.view]
     }
 
+    /// The image of a view on the scale of a cycle.
+    ///
+    /// # Errors
+    /// A photograph that cannot be decoded.
+    pub(super) fn image(&self, at: Place) -> Result<Arc<PackedImage>> {
+        self.images.get(self.cycles[at.cycle].scale_index, at.view)
+    }
+
+    /// The images of a view and of its sources on the scale of a cycle.
+    ///
+    /// # Errors
+    /// A photograph that cannot be decoded.
+    pub(super) fn images(&self, at: Place) -> Result<ViewImages> {
+        let of_source = |&source: &u32| self.image(Place { view: source as usize, ..at });
+        let sources = self.sources(at.view).iter().map(of_source).collect::<Result<_>>()?;
+        Ok(ViewImages { own: self.image(at)?, sources })
+    }
+
     /// The data of a view that the filters of its planes read.
-    pub(super) fn filtered_view(&self, at: Place) -> FilteredView<'_> {
-        let ScaledView { camera, image, range, .. } = self.scaled(at);
+    pub(super) fn filtered_view<'b>(&'b self, at: Place, image: &'b PackedImage) -> FilteredView<'b> {
+        let ScaledView { camera, range, .. } = self.scaled(at);
         FilteredView { camera, image, range: *range, level: self.level }
     }
 
     /// A view and its sources with their published surfaces.
-    pub(super) fn problem<'b>(&'b self, at: Place, surfaces: PublishedSurfaces<'b>) -> Problem<'b> {
-        let ScaledView { camera, image, range, likely_range, .. } = self.scaled(at);
-        let mut problem = Problem::new(camera, image, *range);
+    pub(super) fn problem<'b>(
+        &'b self,
+        at: Place,
+        images: &'b ViewImages,
+        surfaces: PublishedSurfaces<'b>,
+    ) -> Problem<'b> {
+        let ScaledView { camera, range, likely_range, .. } = self.scaled(at);
+        let mut problem = Problem::new(camera, &images.own, *range);
         problem.likely_range = (*likely_range).into();
-        for (&source, surface) in self.sources(at.view).iter().zip(surfaces.0) {
-            let ScaledView { camera: other, image, .. } = self.scaled(Place { view: source as usize, ..at });
+        let sources = self.sources(at.view).iter().zip(&images.sources);
+        for ((&source, image), surface) in sources.zip(surfaces.0) {
+            let ScaledView { camera: other, .. } = self.scaled(Place { view: source as usize, ..at });
             problem.sources.push(Source::new(camera, other, image, surface));
         }
         problem

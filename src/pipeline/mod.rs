@@ -88,7 +88,8 @@ fn run_cycle(
     // Reads the surfaces that the sources published. A view's own planes are freed as soon as it is searched.
     let (previous, surfaces) = previous.take_surfaces();
     let searched = previous.zip(candidates).map(|view, (own, candidates)| {
-        let problem = context.problem(at(view), surfaces.of_sources(context.sources(view)));
+        let images = context.images(at(view))?;
+        let problem = context.problem(at(view), &images, surfaces.of_sources(context.sources(view)));
         let input =
             SearchInput { own: own.as_ref(), candidates: Some(&candidates), is_guided: own.is_some() };
         let found = stages::search(context, at(view), &problem, input, &|units| searching(view, units))?;
@@ -104,10 +105,11 @@ fn run_cycle(
     })?;
 
     // Each view independently.
-    searched.zip(verdicts).map(|_, (own, verdicts)| {
+    searched.zip(verdicts).map(|view, (own, verdicts)| {
+        let image = context.image(at(view))?;
         let mut checked = stages::apply_check(own, &verdicts);
-        stages::correct_fattening(context, &mut checked);
-        stages::smooth_planes(context, &mut checked);
+        stages::correct_fattening(context, &image, &mut checked);
+        stages::smooth_planes(context, &image, &mut checked);
         Ok(Some(stages::publish(context, checked)))
     })
 }
@@ -125,9 +127,11 @@ fn finish(
     // Reads the surfaces that the sources published and, for the recheck, their planes as they were before
     // averaging.
     let filled = estimates.map_ref(|view, own| {
-        let problem = context.problem(at(view), estimates.surfaces_of_sources(context.sources(view)));
+        let images = context.images(at(view))?;
+        let surfaces = estimates.surfaces_of_sources(context.sources(view));
+        let problem = context.problem(at(view), &images, surfaces);
         let averaged = stages::average_across_views(context, &problem, own);
-        let filled = stages::fill_gaps(context, at(view), &averaged);
+        let filled = stages::fill_gaps(context, at(view), &images.own, &averaged);
         let sources = estimates.planes_of_sources(context.sources(view));
         stages::recheck(context, &problem, filled, sources, &|units| advance(view, units))
     })?;
@@ -136,10 +140,11 @@ fn finish(
     // all views since gap filling would take half as much memory again.
     let (estimates, surfaces) = estimates.take_surfaces();
     let results = estimates.zip(filled).map(|view, (own, filled)| {
-        let problem = context.problem(at(view), surfaces.of_sources(context.sources(view)));
+        let images = context.images(at(view))?;
+        let problem = context.problem(at(view), &images, surfaces.of_sources(context.sources(view)));
         let mut planes = stages::average_across_views(context, &problem, &own);
         filled.write_to(&mut planes);
-        stages::remove_speckles(context, at(view), &mut planes);
+        stages::remove_speckles(context, at(view), &images.own, &mut planes);
         stages::classify(context, &problem, own, planes, &filled, &|units| advance(view, units))
     })?;
     Ok(results.into_vec())

@@ -12,6 +12,7 @@ use crate::cross_view::{self, ConsistencyCheck, DepthTolerance, Donor, Target};
 use crate::error::Result;
 use crate::fusion::{self, FusionView, PointCloud};
 use crate::geometry::ViewSets;
+use crate::image::{PackedImage, Picture};
 use crate::matching::Problem;
 use crate::options::Options;
 use crate::parallel::{Advance, ProgressFn};
@@ -175,7 +176,7 @@ pub(super) fn fill_textureless(
     let planes = &mut searched.map.planes;
     if !problem.sources.is_empty() {
         let filter = FillTextureless { problem, is_textureless: &is_textureless };
-        let filled = filter.apply(&context.filtered_view(searched.at), planes);
+        let filled = filter.apply(&context.filtered_view(searched.at, problem.image), planes);
         let rules = SearchRules::new(&context.options, &cycle.scale, cycle.cycle, false).view_set;
         select_sets(problem, rules, &mut view_sets, &pixels_with_planes(&filled, planes));
         if cycle.scale_index > 0 {
@@ -227,8 +228,9 @@ pub(super) fn check(
     sources: SourcePlanes<Searched>,
     advance: Advance,
 ) -> Result<(Vec<Verdict>, f32)> {
+    let images = context.images(own.at)?;
     let check = ConsistencyCheck {
-        problem: &context.problem(own.at, PublishedSurfaces::none(context.sources(own.view()))),
+        problem: &context.problem(own.at, &images, PublishedSurfaces::none(context.sources(own.view()))),
         planes: own.planes(),
         view_sets: own.view_sets(),
         sources: sources.into_vec(),
@@ -256,20 +258,24 @@ pub(super) fn apply_check(
 
 /// Corrects foreground fattening where the scale may end, as far as the view knows: changes depths and
 /// normals of validated pixels at edges; in the last cycle some lose their validation.
-pub(super) fn correct_fattening(context: &RunContext, own: &mut ViewEstimate<Unpublished>) {
+pub(super) fn correct_fattening(
+    context: &RunContext,
+    image: &PackedImage,
+    own: &mut ViewEstimate<Unpublished>,
+) {
     if context.may_end_scale(own.cycle(), own.cycles().last()) {
         let filter = CorrectFattening {
             passes: context.options.refine.fattening_passes,
             is_last_cycle: own.cycle() + 1 == context.cycles().len(),
         };
-        filter.apply(&context.filtered_view(own.at), &mut own.map.planes);
+        filter.apply(&context.filtered_view(own.at, image), &mut own.map.planes);
     }
 }
 
 /// Smooths validated planes: changes their depths and normals.
-pub(super) fn smooth_planes(context: &RunContext, own: &mut ViewEstimate<Unpublished>) {
+pub(super) fn smooth_planes(context: &RunContext, image: &PackedImage, own: &mut ViewEstimate<Unpublished>) {
     let filter = SmoothPlanes { passes: context.options.refine.smoothing_passes };
-    filter.apply(&context.filtered_view(own.at), &mut own.map.planes);
+    filter.apply(&context.filtered_view(own.at, image), &mut own.map.planes);
 }
 
 /// Publishes the validated planes to other views, and records their number.
@@ -312,12 +318,17 @@ impl FilledGaps {
 }
 
 /// Planes, not validated yet, for the pixels of small gaps from the planes around them.
-pub(super) fn fill_gaps(context: &RunContext, at: Place, averaged: &[PixelEstimate]) -> FilledGaps {
+pub(super) fn fill_gaps(
+    context: &RunContext,
+    at: Place,
+    image: &PackedImage,
+    averaged: &[PixelEstimate],
+) -> FilledGaps {
     if !context.options.refine.fill_gaps {
         return FilledGaps(Vec::new());
     }
     let mut planes = averaged.to_vec();
-    let filled = FillGaps.apply(&context.filtered_view(at), &mut planes);
+    let filled = FillGaps.apply(&context.filtered_view(at, image), &mut planes);
     FilledGaps(filled.into_iter().map(|pixel| (pixel, planes[pixel as usize])).collect())
 }
 
@@ -360,9 +371,14 @@ pub(super) fn recheck(
 }
 
 /// Takes the validation from small islands of planes that no surface around them continues.
-pub(super) fn remove_speckles(context: &RunContext, at: Place, planes: &mut [PixelEstimate]) {
+pub(super) fn remove_speckles(
+    context: &RunContext,
+    at: Place,
+    image: &PackedImage,
+    planes: &mut [PixelEstimate],
+) {
     let filter = RemoveSpeckles { max_size: context.options.refine.max_speckle_size };
-    filter.apply(&context.filtered_view(at), planes);
+    filter.apply(&context.filtered_view(at, image), planes);
 }
 
 /// Determines view set, cost (mean of 1 - NCC), confidence and status of every pixel; filled planes of pixels
@@ -418,13 +434,15 @@ pub(super) fn fuse(
     progress: ProgressFn,
 ) -> Result<PointCloud> {
     let overlaps = fusion::overlaps(results.len(), scene.points());
-    let views: Vec<FusionView> = (scene.views().iter().zip(results).zip(&overlaps))
-        .map(|((view, result), overlap)| FusionView {
+    let pictures: Vec<Picture> =
+        scene.views().iter().map(|view| view.picture.load()).collect::<Result<_>>()?;
+    let views: Vec<FusionView> = (scene.views().iter().zip(results).zip(&overlaps).zip(&pictures))
+        .map(|(((view, result), overlap), picture)| FusionView {
             camera: &view.camera,
             maps: &result.raw,
             status: Some(&result.status),
             confidence: Some(&result.confidence),
-            picture: Some(&view.picture),
+            picture: Some(picture),
             overlap,
         })
         .collect();

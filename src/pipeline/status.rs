@@ -76,13 +76,8 @@ mod tests {
         (map.planes[8].validated, expected[8]) = (true, PixelStatus::Validated);
         confidence.has_texture[8] = false;
 
-        let view = ScaledView {
-            camera: world.cameras[0],
-            image: world.images[0].clone(),
-            mask: Some(mask),
-            range: RANGE,
-            likely_range: RANGE,
-        };
+        let view =
+            ScaledView { camera: world.cameras[0], mask: Some(mask), range: RANGE, likely_range: RANGE };
         assert_eq!(classify(&view, &map.planes, &confidence, 2), expected);
         // With a single source no pixel can be validated, for this reason.
         map.planes.iter_mut().for_each(|plane| plane.validated = false);

@@ -141,7 +141,8 @@ impl Stepper {
         let advance = |units| tracker.advance(units, self.0.progress(Phase::Search, at));
         let known = |view: usize| estimates.get(view).copied().flatten();
         let own = known(view);
-        let problem = self.0.problem(at, self.surfaces(view, estimates));
+        let images = self.0.images(at)?;
+        let problem = self.0.problem(at, &images, self.surfaces(view, estimates));
         let is_guided = estimates.iter().any(Option::is_some);
         let input = SearchInput { own, candidates, is_guided };
         let found = stages::search(&self.0, at, &problem, input, &advance)?;
@@ -167,9 +168,10 @@ impl Stepper {
         let planes = |view: usize| sources.get(view).copied().flatten().map(EstimateRef::planes);
         let planes = SourcePlanes::new(self.sources(own.view()), planes);
         let verdicts = stages::check(&self.0, own, planes, &|_| Ok(()))?;
+        let image = self.0.image(own.at)?;
         let mut checked = stages::apply_check(own.clone(), &verdicts);
-        stages::correct_fattening(&self.0, &mut checked);
-        stages::smooth_planes(&self.0, &mut checked);
+        stages::correct_fattening(&self.0, &image, &mut checked);
+        stages::smooth_planes(&self.0, &image, &mut checked);
         Ok(stages::publish(&self.0, checked))
     }
 
@@ -202,14 +204,15 @@ impl Stepper {
         };
         let tracker = Tracker::with_work(progress, 1);
         let advance = |units| tracker.advance(units, self.0.progress(Phase::Check, at));
-        let problem = self.0.problem(at, self.surfaces(view, estimates));
+        let images = self.0.images(at)?;
+        let problem = self.0.problem(at, &images, self.surfaces(view, estimates));
         let mut planes = stages::average_across_views(&self.0, &problem, own);
-        let filled = stages::fill_gaps(&self.0, at, &planes);
+        let filled = stages::fill_gaps(&self.0, at, &images.own, &planes);
         let known = |view: usize| estimates.get(view).copied().flatten().map(ViewEstimate::planes);
         let sources = SourcePlanes::new(self.sources(view), known);
         let filled = stages::recheck(&self.0, &problem, filled, sources, &advance)?;
         filled.write_to(&mut planes);
-        stages::remove_speckles(&self.0, at, &mut planes);
+        stages::remove_speckles(&self.0, at, &images.own, &mut planes);
         stages::classify(&self.0, &problem, own.clone(), planes, &filled, &advance)
     }
 

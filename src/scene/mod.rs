@@ -2,16 +2,18 @@
 
 mod compact_plane;
 mod depth_ranges;
+mod image_cache;
 mod maps;
 mod plane_map;
 mod scaled_view;
 
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, DepthRange};
-use crate::image::Picture;
+use crate::image::Photograph;
 pub(crate) use compact_plane::CompactPlane;
 use depth_ranges::{DepthRanges, depth_ranges};
 use glam::DVec3;
+pub(crate) use image_cache::ImageCache;
 pub use maps::{Maps, PixelStatus};
 pub(crate) use plane_map::{PixelEstimate, PlaneMap, Verdict, validated_planes};
 pub(crate) use scaled_view::ScaledView;
@@ -21,8 +23,8 @@ pub(crate) use scaled_view::ScaledView;
 pub struct View {
     /// A name for messages and files.
     pub name: String,
-    /// The photograph, of the camera's size.
-    pub picture: Picture,
+    /// The photograph, of the camera's size, in memory or decoded when it is needed.
+    pub picture: Photograph,
     /// Its calibration and pose.
     pub camera: Camera,
     /// `true` where a depth is estimated, one value for each pixel, row by row; `None` estimates all. Other
@@ -138,7 +140,7 @@ fn check_names(views: &[View]) -> Result<()> {
 
 fn check_view(view: &View, name: &str) -> Result<()> {
     view.camera.check(&format!("{name}.camera"))?;
-    let (width, height) = (view.picture.width(), view.picture.height());
+    let (width, height) = view.picture.size();
     if (width, height) != (view.camera.width, view.camera.height) {
         let expected = format!("the camera's size, {}x{}", view.camera.width, view.camera.height);
         return Err(Error::argument(format!("{name}.picture"), format!("{width}x{height}"), expected));

@@ -2,16 +2,14 @@
 
 use crate::geometry::Camera;
 use crate::geometry::DepthRange;
-use crate::image::{PackedImage, Picture, halve_mask};
+use crate::image::halve_mask;
 use crate::scene::Scene;
 
-/// A view reduced to one scale.
+/// A view reduced to one scale, its image excepted.
 #[derive(Debug, Clone)]
 pub(crate) struct ScaledView {
     /// Its camera on this scale.
     pub camera: Camera,
-    /// Its gray image in the layout the kernels sample.
-    pub image: PackedImage,
     /// `true` where a depth is estimated: where the mask is set in any of the pixels of full size.
     pub mask: Option<Vec<bool>>,
     /// The range that depths are limited to.
@@ -21,27 +19,25 @@ pub(crate) struct ScaledView {
 }
 
 impl ScaledView {
-    /// The view of a scene with this index, its image reduced by this power of two.
+    /// The view of a scene with this index, reduced by this power of two.
     pub(crate) fn of(scene: &Scene, index: usize, downscale: u32) -> ScaledView {
         let view = &scene.views()[index];
         let (range, likely_range) = (scene.outer_range(index), scene.depth_range(index));
         let mut camera = view.camera;
-        let mut halved: Option<Picture> = None;
         let mut mask = view.mask.clone();
         for _ in 0..downscale.trailing_zeros() {
-            halved = Some(halved.as_ref().unwrap_or(&view.picture).halved());
             mask = mask.map(|mask| halve_mask(&mask, &camera));
             camera = camera.halved();
         }
-        let image = PackedImage::new(halved.as_ref().unwrap_or(&view.picture));
-        ScaledView { camera, image, mask, range, likely_range }
+        ScaledView { camera, mask, range, likely_range }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::View;
+    use crate::image::Picture;
+    use crate::scene::{ImageCache, View};
     use glam::{DMat3, DVec3};
 
     /// Two views of 5 x 3 pixels whose masks are set in one pixel only.
@@ -58,7 +54,7 @@ mod tests {
         };
         let view = |name: &str| View {
             name: name.to_owned(),
-            picture: Picture::from_gray(5, 3, (0..15).map(|pixel| pixel * 10).collect()).unwrap(),
+            picture: Picture::from_gray(5, 3, (0..15).map(|pixel| pixel * 10).collect()).unwrap().into(),
             camera,
             mask: Some((0..15).map(|pixel| pixel == set_pixel).collect()),
             depth_range: Some(DepthRange { near: 1.0, far: 2.0 }),
@@ -85,15 +81,19 @@ mod tests {
     #[test]
     fn image_camera_and_mask_are_halved_together() {
         let scene = scene(0);
-        for (downscale, size) in [(1, (5, 3)), (2, (3, 2)), (4, (2, 1)), (8, (1, 1)), (16, (1, 1))] {
-            let views = [0, 1].map(|view| ScaledView::of(&scene, view, downscale));
-            for view in views {
+        let sizes = [(1, (5, 3)), (2, (3, 2)), (4, (2, 1)), (8, (1, 1)), (16, (1, 1))];
+        let photographs = scene.views().iter().map(|view| view.picture.clone()).collect();
+        let images = ImageCache::new(photographs, sizes.map(|(downscale, _)| downscale).to_vec(), usize::MAX);
+        for (scale, (downscale, size)) in sizes.into_iter().enumerate() {
+            for index in 0..2 {
+                let (view, image) =
+                    (ScaledView::of(&scene, index, downscale), images.get(scale, index).unwrap());
                 assert_eq!((view.camera.width, view.camera.height), size);
-                assert_eq!((view.image.width as u32, view.image.height as u32), size);
+                assert_eq!((image.width as u32, image.height as u32), size);
                 assert_eq!(view.range, DepthRange { near: 1.0, far: 2.0 });
             }
         }
-        let halved = ScaledView::of(&scene, 1, 2).image;
+        let halved = images.get(1, 1).unwrap();
         assert_eq!(halved.gray(0, 0), 30, "the mean of 0, 10, 50 and 60");
         assert_eq!(halved.gray(2, 1), 140, "the last pixel alone");
     }

@@ -173,7 +173,7 @@ fn sets_of_more_than_64_sources_are_selected() {
 fn lists(cameras: &[Camera], points: &[(DVec3, &[u32])], options: &Options) -> SourceLists {
     let views = cameras.iter().enumerate().map(|(index, camera)| View {
         name: format!("view{index}"),
-        picture: blank(),
+        picture: blank().into(),
         camera: *camera,
         mask: None,
         depth_range: Some(RANGE),
@@ -218,7 +218,7 @@ fn source_lists_of_the_scene_are_used_unchanged() {
     let views = |sources: Option<Vec<u32>>| -> Vec<View> {
         let view = |(index, camera): (usize, &Camera)| View {
             name: format!("view{index}"),
-            picture: blank(),
+            picture: blank().into(),
             camera: *camera,
             mask: None,
             depth_range: Some(RANGE),

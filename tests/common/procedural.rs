@@ -130,7 +130,7 @@ impl Procedural {
     pub fn new(surfaces: Vec<Surface>, cameras: &[Camera]) -> Procedural {
         let views = cameras.iter().enumerate().map(|(index, camera)| View {
             name: format!("view{index}.png"),
-            picture: render(&surfaces, camera),
+            picture: render(&surfaces, camera).into(),
             camera: *camera,
             mask: None,
             depth_range: None,
@@ -166,14 +166,16 @@ impl Procedural {
     pub fn with_noise(mut self, deviation: f64) -> Procedural {
         for (index, view) in self.views.iter_mut().enumerate() {
             let (width, height) = (view.camera.width, view.camera.height);
+            let picture = view.picture.load().expect("a picture in memory");
             let noisy = |pixel: usize| {
                 // The sum of twelve uniform values is nearly normally distributed, with variance 1.
                 let draw = |octave| lattice_value(DVec3::new(index as f64, pixel as f64, -7.0), octave);
                 let offset = deviation * ((100..112).map(draw).sum::<f64>() - 6.0);
-                view.picture.rgb(pixel).map(|channel| (f64::from(channel) + offset).round() as u8)
+                picture.rgb(pixel).map(|channel| (f64::from(channel) + offset).round() as u8)
             };
             let colors = (0..view.camera.pixels()).map(noisy).collect();
-            view.picture = Picture::from_rgb(width, height, colors).expect("one color for each pixel");
+            let noisy = Picture::from_rgb(width, height, colors).expect("one color for each pixel");
+            view.picture = noisy.into();
         }
         self
     }

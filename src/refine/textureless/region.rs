@@ -107,7 +107,8 @@ pub(super) fn is_open(planes: &[PixelEstimate], is_textureless: &[bool], pixel: 
 /// continue beyond its border may be a sky, and what surrounds a sky is in front of it.
 pub(super) fn find_enclosed(grid: Grid, is_textureless: &[bool]) -> Vec<bool> {
     let mut is_enclosed = vec![false; is_textureless.len()];
-    let border_sides = |&pixel: &usize| grid.four_neighbors(pixel).iter().filter(|side| side.is_none()).count();
+    let border_sides =
+        |&pixel: &usize| grid.four_neighbors(pixel).iter().filter(|side| side.is_none()).count();
     for_each_component(
         grid,
         |pixel| is_textureless[pixel],
