@@ -1,6 +1,7 @@
-//! Sets the SONAME of the shared library, and writes the file with the version that `cargo cinstall`
-//! installs.
+//! Sets the SONAME of the shared library, writes the file with the version that `cargo cinstall` installs, and
+//! takes a fingerprint of the source, by which runs in a folder know the program that began them.
 
+use std::hash::{DefaultHasher, Hasher};
 use std::path::Path;
 
 const CMAKE_VERSION_TEMPLATE: &str = "include/cmake/skep-config-version.cmake.in";
@@ -22,6 +23,9 @@ fn main() {
         _ => (),
     }
 
+    println!("cargo:rerun-if-changed=src");
+    println!("cargo:rustc-env=SKEP_SOURCE_FINGERPRINT={:08x}", source_fingerprint() as u32);
+
     let template =
         std::fs::read_to_string(CMAKE_VERSION_TEMPLATE).expect("the template is part of the package");
     let folder = Path::new(&variable("OUT_DIR")).join("cmake");
@@ -31,4 +35,22 @@ fn main() {
         template.replace("@SKEP_VERSION@", &variable("CARGO_PKG_VERSION")),
     )
     .expect("cargo's folder for build results can be written");
+}
+
+/// A hash of all files of the source.
+fn source_fingerprint() -> u64 {
+    let mut files = Vec::new();
+    let mut folders = vec![Path::new("src").to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            let path = entry.path();
+            if path.is_dir() { folders.push(path) } else { files.push(path) }
+        }
+    }
+    files.sort();
+    let mut hasher = DefaultHasher::new();
+    for path in files.iter().filter(|path| path.extension().is_some_and(|extension| extension == "rs")) {
+        hasher.write(&std::fs::read(path).unwrap_or_default());
+    }
+    hasher.finish()
 }

@@ -185,7 +185,10 @@ pub mod geometry;
 pub mod image;
 #[cfg(feature = "io")]
 pub mod io;
+#[cfg(feature = "io")]
+pub mod job;
 pub mod matching;
+mod memory;
 mod options;
 mod parallel;
 mod pipeline;
@@ -200,6 +203,7 @@ pub use ambc::Counts;
 pub use error::{Error, Result};
 pub use fusion::{PointCloud, PointViews};
 pub use geometry::DepthRange;
+pub use memory::{available_memory, format_bytes, parse_bytes};
 pub use options::{
     CheckOptions, CostOptions, FusionOptions, Kind, OptionInfo, OptionValue, Options, RefineOptions, Scale,
     ScheduleOptions, SearchOptions, ViewSelectionOptions, WindowOptions,

@@ -5,6 +5,7 @@ use std::ops::AddAssign;
 
 /// Counts of the work done; they depend on input and options only.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct Counts {
     /// Patches compared with a patch in one source view.
     pub ncc_evaluations: u64,

@@ -6,6 +6,8 @@ use glam::DVec3;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Member {
     pub(super) view: u32,
+    /// Place of the view in the group of the reference.
+    pub(super) slot: usize,
     /// Index in its view's maps.
     pub(super) pixel: usize,
     /// Relative to the reference's center, in world axes: large world coordinates lose no digits.
@@ -78,7 +80,7 @@ mod tests {
     use super::*;
 
     fn member(height: f64) -> Member {
-        Member { view: 0, pixel: 0, position: DVec3::Z * height, normal: DVec3::Z, weight: 1.0 }
+        Member { view: 0, slot: 0, pixel: 0, position: DVec3::Z * height, normal: DVec3::Z, weight: 1.0 }
     }
 
     #[test]

@@ -5,9 +5,10 @@
 //! both see. The gains `exp(g)` minimize `sum n (g_a - g_b + m)^2` over all pairs of `n` points each, and are
 //! 1 in the mean.
 
-use super::Reference;
 use super::source::{Comparison, Source};
+use super::{FusionInput, Reference, with_group};
 use crate::error::Result;
+use crate::options::FusionOptions;
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -32,34 +33,36 @@ struct Pair {
 /// Factors of red, green and blue for each view; calls `before` before each reference view.
 ///
 /// # Errors
-/// What `before` returns.
-pub(super) fn gains<'a>(
-    views: usize,
-    reference: impl Fn(usize) -> Reference<'a>,
+/// Views that cannot be read; what `before` returns.
+pub(super) fn gains(
+    input: &dyn FusionInput,
+    options: &FusionOptions,
     before: impl Fn(usize) -> Result<()>,
 ) -> Result<Vec<DVec3>> {
     let mut pairs = Vec::new();
-    for index in 0..views {
+    for index in 0..input.len() {
         before(index)?;
-        let reference = reference(index);
-        pairs.par_extend(reference.sources.par_iter().filter_map(|source| pair(&reference, source)));
+        with_group(input, index, &mut |group| {
+            let reference = Reference::new(group, index, input.overlap(index), options);
+            pairs.par_extend(reference.sources.par_iter().filter_map(|source| pair(&reference, source)));
+            Ok(())
+        })?;
     }
-    Ok(solve(views, &pairs).into_iter().map(DVec3::exp).collect())
+    Ok(solve(input.len(), &pairs).into_iter().map(DVec3::exp).collect())
 }
 
 /// Compares the colors of the reference and a source where they see the same surface.
 fn pair(reference: &Reference, source: &Source) -> Option<Pair> {
-    let views = reference.views;
-    let camera = views[reference.index].camera;
+    let group = reference.group;
+    let camera = group[0].camera;
     let step = MIN_STEP.max((camera.pixels() as f64 / MAX_SAMPLES).sqrt() as usize);
-    let own_picture = views[reference.index].picture?;
+    let own_picture = group[0].picture?;
     let mut ratios: [Vec<f64>; 3] = Default::default();
     for row in (0..camera.height).step_by(step) {
         for column in (0..camera.width).step_by(step) {
             let Some((pixel, depth, start)) = reference.start((column, row)) else { continue };
             let Comparison::Consistent(other) = source.compare(pixel, depth, &start) else { continue };
-            let (own, other) =
-                (own_picture.rgb(start.pixel), views[other.view as usize].picture?.rgb(other.pixel));
+            let (own, other) = (own_picture.rgb(start.pixel), group[other.slot].picture?.rgb(other.pixel));
             if own.iter().chain(&other).all(|channel| USABLE.contains(channel)) {
                 for (channel, ratios) in ratios.iter_mut().enumerate() {
                     ratios.push((f64::from(own[channel]) / f64::from(other[channel])).ln());

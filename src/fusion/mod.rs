@@ -96,37 +96,109 @@ pub fn fuse(views: &[FusionView], options: &FusionOptions, progress: ProgressFn)
     for index in 0..views.len() {
         check_view(views, index)?;
     }
-    let used: Vec<Used> = views.iter().map(|view| Used::none_of(view.camera.pixels())).collect();
-    let total_rows: u64 = views.iter().map(|view| u64::from(view.camera.height)).sum();
+    let mut cloud = PointCloud::default();
+    fuse_input(&InMemory(views), options, progress, &mut |points| {
+        append(&mut cloud, points);
+        Ok(())
+    })?;
+    Ok(cloud)
+}
+
+/// The views of a fusion, of which a few at a time have to be in memory.
+pub(crate) trait FusionInput {
+    /// Number of views.
+    fn len(&self) -> usize;
+
+    /// The camera of a view.
+    fn camera(&self, view: usize) -> &Camera;
+
+    /// The views that may see the same surface as a view.
+    fn overlap(&self, view: usize) -> &[u32];
+
+    /// Calls `body` with these views, in this order.
+    ///
+    /// # Errors
+    /// Views that cannot be read; what `body` returns.
+    fn with_views(&self, views: &[u32], body: &mut dyn FnMut(&[FusionView]) -> Result<()>) -> Result<()>;
+}
+
+/// Views that are all in memory.
+struct InMemory<'a>(&'a [FusionView<'a>]);
+
+impl FusionInput for InMemory<'_> {
+    fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    fn camera(&self, view: usize) -> &Camera {
+        self.0[view].camera
+    }
+
+    fn overlap(&self, view: usize) -> &[u32] {
+        self.0[view].overlap
+    }
+
+    fn with_views(&self, views: &[u32], body: &mut dyn FnMut(&[FusionView]) -> Result<()>) -> Result<()> {
+        let group: Vec<FusionView> = views.iter().map(|&view| self.0[view as usize]).collect();
+        body(&group)
+    }
+}
+
+/// Calls `body` with a view and those that overlap with it, in this order.
+fn with_group(
+    input: &dyn FusionInput,
+    index: usize,
+    body: &mut dyn FnMut(&[FusionView]) -> Result<()>,
+) -> Result<()> {
+    let group: Vec<u32> = std::iter::once(index as u32).chain(input.overlap(index).iter().copied()).collect();
+    input.with_views(&group, body)
+}
+
+/// Fuses like [`fuse`], gives the points to `emit` as they are made, and has only the views that overlap with
+/// one in memory at a time. The options and the views must be valid.
+///
+/// # Errors
+/// Views that cannot be read; what `emit` returns; [`Error::Cancelled`].
+pub(crate) fn fuse_input(
+    input: &dyn FusionInput,
+    options: &FusionOptions,
+    progress: ProgressFn,
+    emit: &mut dyn FnMut(&PointCloud) -> Result<()>,
+) -> Result<()> {
+    let count = input.len();
+    let used: Vec<Used> = (0..count).map(|view| Used::none_of(input.camera(view).pixels())).collect();
+    let total_rows: u64 = (0..count).map(|view| u64::from(input.camera(view).height)).sum();
     let mut rows_done = 0;
     let report = |view: usize, rows_done: u64| {
         let done = rows_done as f64 / total_rows.max(1) as f64;
-        let at = Progress { phase: Phase::Fusion, downscale: 1, cycle: 0, view, views: views.len(), done };
+        let at = Progress { phase: Phase::Fusion, downscale: 1, cycle: 0, view, views: count, done };
         if progress(&at).is_break() { Err(Error::Cancelled) } else { Ok(()) }
     };
 
-    let reference = |index| Reference::new(views, index, options, &used);
     let gains = match options.compensate_exposure {
-        true => exposure::gains(views.len(), reference, |index| report(index, 0))?,
-        false => vec![DVec3::ONE; views.len()],
+        true => exposure::gains(input, options, |index| report(index, 0))?,
+        false => vec![DVec3::ONE; count],
     };
-    let mut cloud = PointCloud::default();
-    for (index, view) in views.iter().enumerate() {
-        let reference = reference(index);
-        let height = view.camera.height;
-        for top in (0..height).step_by(BAND_ROWS as usize) {
-            report(index, rows_done)?;
-            let rows = top..height.min(top + BAND_ROWS);
-            rows_done += rows.len() as u64;
-            let fused: Vec<PointCloud> =
-                rows.into_par_iter().map(|row| reference.fuse_row(row, &gains)).collect();
-            fused.iter().for_each(|points| append(&mut cloud, points));
-        }
+    for index in 0..count {
+        report(index, rows_done)?;
+        with_group(input, index, &mut |group| {
+            let reference = Reference::new(group, index, input.overlap(index), options);
+            let height = group[0].camera.height;
+            for top in (0..height).step_by(BAND_ROWS as usize) {
+                report(index, rows_done)?;
+                let rows = top..height.min(top + BAND_ROWS);
+                rows_done += rows.len() as u64;
+                let fused: Vec<PointCloud> =
+                    rows.into_par_iter().map(|row| reference.fuse_row(row, &used, &gains)).collect();
+                fused.iter().try_for_each(&mut *emit)?;
+            }
+            Ok(())
+        })?;
     }
-    if let Some(last) = views.len().checked_sub(1) {
-        report(last, rows_done)?;
+    match count.checked_sub(1) {
+        Some(last) => report(last, rows_done),
+        None => Ok(()),
     }
-    Ok(cloud)
 }
 
 fn check_view(views: &[FusionView], index: usize) -> Result<()> {
@@ -208,33 +280,36 @@ impl Used {
 
 /// The view whose pixels become points.
 struct Reference<'a> {
-    views: &'a [FusionView<'a>],
+    /// The reference, then the views of the sources.
+    group: &'a [FusionView<'a>],
     index: usize,
     options: &'a FusionOptions,
     sources: Vec<Source<'a>>,
-    /// By view and pixel, whether the pixel is part of a point. While one view is the reference, its own
-    /// flags are only read and those of the others only set: the order of the threads does not matter.
-    used: &'a [Used],
 }
 
 impl<'a> Reference<'a> {
-    fn new(views: &'a [FusionView<'a>], index: usize, options: &'a FusionOptions, used: &'a [Used]) -> Self {
-        let sources = views[index]
-            .overlap
-            .iter()
-            .map(|&other| Source::new(views[index].camera, other, &views[other as usize], options));
-        Reference { views, index, options, sources: sources.collect(), used }
+    fn new(
+        group: &'a [FusionView<'a>],
+        index: usize,
+        overlap: &[u32],
+        options: &'a FusionOptions,
+    ) -> Reference<'a> {
+        let source = |(slot, &view): (usize, &u32)| {
+            Source::new(group[0].camera, (view, slot + 1), &group[slot + 1], options)
+        };
+        Reference { group, index, options, sources: overlap.iter().enumerate().map(source).collect() }
     }
 
     /// The place, depth and member of a pixel with a usable estimate.
     fn start(&self, (column, row): (u32, u32)) -> Option<(DVec2, f64, Member)> {
-        let view = &self.views[self.index];
+        let view = &self.group[0];
         let pixel = row as usize * view.camera.width as usize + column as usize;
         let (depth, normal) = estimate(view, self.options, pixel)?;
         let place = DVec2::new(f64::from(column), f64::from(row));
         let to_world = view.camera.rotation.transpose();
         let start = Member {
             view: self.index as u32,
+            slot: 0,
             pixel,
             position: to_world * (view.camera.ray(place) * depth),
             normal: to_world * normal,
@@ -243,15 +318,17 @@ impl<'a> Reference<'a> {
         Some((place, depth, start))
     }
 
-    /// The points that start in a row; `gains` are the factors of the colors of each view.
-    fn fuse_row(&self, row: u32, gains: &[DVec3]) -> PointCloud {
-        let view = &self.views[self.index];
+    /// The points that start in a row; `gains` are the factors of the colors of each view. `used` tells by view
+    /// and pixel whether it is part of a point: while one view is the reference, its own flags are only read
+    /// and those of the others only set, so that the order of the threads does not matter.
+    fn fuse_row(&self, row: u32, used: &[Used], gains: &[DVec3]) -> PointCloud {
+        let view = &self.group[0];
         let first = row as usize * view.camera.width as usize;
         let mut points = PointCloud::default();
         let (mut members, mut point_views) = (Vec::new(), Vec::new());
         for column in 0..view.camera.width {
             let pixel = first + column as usize;
-            if self.used[self.index].has(pixel) {
+            if used[self.index].has(pixel) {
                 continue;
             }
             let Some((place, depth, start)) = self.start((column, row)) else { continue };
@@ -259,14 +336,13 @@ impl<'a> Reference<'a> {
                 continue;
             }
             for member in &members[1..] {
-                self.used[member.view as usize].add(member.pixel);
+                used[member.view as usize].add(member.pixel);
             }
             point_views.clear();
             point_views.extend(members.iter().map(|member| member.view));
             let (position, normal, color) = average(&members, |member| {
-                let view = member.view as usize;
-                let color = |rgb| DVec3::from_array(rgb) * gains[view];
-                self.views[view].picture.map(|picture| color(picture.rgb(member.pixel).map(f64::from)))
+                let color = |rgb| DVec3::from_array(rgb) * gains[member.view as usize];
+                self.group[member.slot].picture.map(|picture| color(picture.rgb(member.pixel).map(f64::from)))
             });
             points.positions.push((view.camera.center() + position).to_array());
             points.normals.push(normal.as_vec3().to_array());

@@ -28,6 +28,8 @@ const MAX_TOLERANCE: f64 = 0.05;
 /// A view that overlaps the reference, with the transforms from one to the other.
 pub(super) struct Source<'a> {
     pub(super) index: u32,
+    /// Place of the view in the group of the reference.
+    slot: usize,
     view: &'a FusionView<'a>,
     /// `K' R K^-1`: a reference pixel (x, y, 1) at depth d falls on `transfer (x, y, 1) d + shift`.
     transfer: DMat3,
@@ -44,7 +46,7 @@ pub(super) struct Source<'a> {
 impl<'a> Source<'a> {
     pub(super) fn new(
         reference: &Camera,
-        index: u32,
+        (index, slot): (u32, usize),
         view: &'a FusionView<'a>,
         options: &'a FusionOptions,
     ) -> Source<'a> {
@@ -53,6 +55,7 @@ impl<'a> Source<'a> {
         let rotation = camera.rotation * reference.rotation.transpose();
         Source {
             index,
+            slot,
             view,
             transfer: camera.calibration() * rotation * reference.calibration().inverse(),
             shift: camera.calibration() * (camera.rotation * -center),
@@ -94,6 +97,7 @@ impl<'a> Source<'a> {
         let position = self.center + self.to_world * (ray * depth);
         Comparison::Consistent(Member {
             view: self.index,
+            slot: self.slot,
             pixel,
             position,
             normal,

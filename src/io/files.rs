@@ -25,10 +25,17 @@ pub fn write_file(
         write(&mut writer)?;
         writer.flush()?;
         drop(writer);
+        // A name must not appear before its content is on the disk: power may fail in between.
+        temporary.as_file().sync_data()?;
         temporary.persist(path)?;
         Ok(())
     };
-    attempt().map_err(|error| Error::file(path, format!("cannot be written: {error}")))
+    attempt().map_err(|error| cannot_be_written(path, error))
+}
+
+/// The error of a file that cannot be written.
+pub(crate) fn cannot_be_written(path: &Path, error: impl std::fmt::Display) -> Error {
+    Error::file(path, format!("cannot be written: {error}"))
 }
 
 /// Whether the files of a view of this name lie inside their folder.
@@ -41,16 +48,16 @@ pub(super) fn stays_inside(name: &str) -> bool {
 pub(super) const NAME_INSIDE: &str = "a path below the folder of images, without `..`";
 
 /// Copies a file atomically.
-pub(super) fn copy_file(from: &Path, to: &Path) -> Result<()> {
+pub(crate) fn copy_file(from: &Path, to: &Path) -> Result<()> {
     let mut source = File::open(from).map_err(|error| cannot_be_read(from, error))?;
     write_file(to, |out| io::copy(&mut source, out).map(drop))
 }
 
 /// Hard-links a file; copies it where the file system cannot link.
-pub(super) fn link_or_copy(from: &Path, to: &Path) -> Result<()> {
+pub(crate) fn link_or_copy(from: &Path, to: &Path) -> Result<()> {
     if let Some(parent) = to.parent() {
         let made = std::fs::create_dir_all(parent);
-        made.map_err(|error| Error::file(to, format!("cannot be written: {error}")))?;
+        made.map_err(|error| cannot_be_written(to, error))?;
     }
     match std::fs::hard_link(from, to) {
         Ok(()) => Ok(()),
@@ -154,6 +161,6 @@ impl FileReader {
 }
 
 /// The error of a file that cannot be opened or read.
-pub(super) fn cannot_be_read(path: &Path, error: impl std::fmt::Display) -> Error {
+pub(crate) fn cannot_be_read(path: &Path, error: impl std::fmt::Display) -> Error {
     Error::file(path, format!("cannot be read: {error}"))
 }

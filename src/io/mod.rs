@@ -18,7 +18,10 @@ pub use colmap_maps::{
 };
 pub use colmap_model::{ColmapModel, ModelImage};
 pub use files::write_file;
+pub(crate) use files::{cannot_be_read, cannot_be_written, link_or_copy};
+pub(crate) use pictures::picture_from_bytes;
 pub use pictures::{picture_size, read_picture, write_picture};
+pub(crate) use ply::{CloudWriter, visibility_path};
 pub use ply::{read_ply, read_visibility, write_ply, write_visibility};
 pub use previews::{write_depth_preview, write_fraction_preview, write_normal_preview, write_views_preview};
 pub use scene_folder::{SceneFolder, read_scene, write_scene};

@@ -7,14 +7,24 @@ use crate::image::Picture;
 use image::codecs::png::PngEncoder;
 use image::{ColorType, DynamicImage, ExtendedColorType, ImageEncoder, ImageReader, Limits};
 use std::fs::File;
-use std::io::{self, BufReader};
+use std::io::{self, BufRead, BufReader, Cursor, Seek};
 use std::path::Path;
 
 /// Reads a PNG or JPEG file, color or gray, 8 or 16 bits (16 are rounded to 8). An alpha channel is dropped;
 /// nothing else is applied, neither an orientation nor a color profile: the calibration refers to the stored
 /// pixels.
 pub fn read_picture(path: &Path) -> Result<Picture> {
-    let image = open(path)?.decode().map_err(|error| cannot_be_read(path, error))?;
+    decode(open(path)?, path)
+}
+
+/// The picture in the bytes of a file, like [`read_picture`]; errors name the file.
+pub(crate) fn picture_from_bytes(bytes: &[u8], path: &Path) -> Result<Picture> {
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    decode(limited(reader.map_err(|error| cannot_be_read(path, error))?), path)
+}
+
+fn decode<R: BufRead + Seek>(reader: ImageReader<R>, path: &Path) -> Result<Picture> {
+    let image = reader.decode().map_err(|error| cannot_be_read(path, error))?;
     let (width, height) = (image.width(), image.height());
     if is_gray(&image) {
         return Picture::from_gray(width, height, image.into_luma8().into_raw());
@@ -46,10 +56,13 @@ fn is_gray(image: &DynamicImage) -> bool {
 /// The format is detected from the content, not from the name.
 fn open(path: &Path) -> Result<ImageReader<BufReader<File>>> {
     let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
-    let mut reader = reader.map_err(|error| cannot_be_read(path, error))?;
+    Ok(limited(reader.map_err(|error| cannot_be_read(path, error))?))
+}
+
+fn limited<R: BufRead + Seek>(mut reader: ImageReader<R>) -> ImageReader<R> {
     let mut limits = Limits::no_limits();
     limits.max_image_width = Some(Camera::MAX_SIDE);
     limits.max_image_height = Some(Camera::MAX_SIDE);
     reader.limits(limits);
-    Ok(reader)
+    reader
 }

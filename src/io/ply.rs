@@ -1,6 +1,6 @@
 //! Fused clouds as COLMAP and viewers read them: `fused.ply` and `fused.ply.vis`.
 
-use super::files::{FileReader, cannot_be_read, write_file};
+use super::files::{FileReader, cannot_be_read, cannot_be_written, write_file};
 use crate::error::{Error, Result};
 use crate::fusion::{PointCloud, PointViews};
 use ply_rs_bw::parser::{Parser, Reader};
@@ -9,8 +9,9 @@ use ply_rs_bw::ply::{
 };
 use ply_rs_bw::writer::Writer;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Write};
-use std::path::Path;
+use std::io::{self, BufRead, BufReader, BufWriter, Seek, Write};
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
 
 /// Names of the properties in COLMAP's order: floats, then bytes.
 const FLOATS: [&str; 6] = ["x", "y", "z", "nx", "ny", "nz"];
@@ -86,19 +87,90 @@ pub fn write_ply(path: &Path, cloud: &PointCloud) -> Result<()> {
             ));
         }
     }
-    let header = header(points);
+    write_file(path, |out| {
+        Writer::<Vertex>::new().write_header(out, &header(points))?;
+        write_points(out, cloud)
+    })
+}
+
+/// Writes the points without a header.
+fn write_points(out: &mut impl Write, cloud: &PointCloud) -> io::Result<()> {
+    let header = header(0);
     let definition = &header.elements["vertex"];
     let writer = Writer::<Vertex>::new();
-    write_file(path, |out| {
-        writer.write_header(out, &header)?;
-        for ((position, normal), color) in cloud.positions.iter().zip(&cloud.normals).zip(&cloud.colors) {
-            let [x, y, z] = position.map(|coordinate| coordinate as f32);
-            let [nx, ny, nz] = *normal;
-            let vertex = Vertex { floats: [x, y, z, nx, ny, nz], color: *color };
-            writer.write_little_endian_element(out, &vertex, definition)?;
-        }
-        Ok(())
-    })
+    for ((position, normal), color) in cloud.positions.iter().zip(&cloud.normals).zip(&cloud.colors) {
+        let [x, y, z] = position.map(|coordinate| coordinate as f32);
+        let [nx, ny, nz] = *normal;
+        let vertex = Vertex { floats: [x, y, z, nx, ny, nz], color: *color };
+        writer.write_little_endian_element(out, &vertex, definition)?;
+    }
+    Ok(())
+}
+
+/// Writes a cloud and the views of its points, like [`write_ply`] and [`write_visibility`], while the points
+/// are made: their number precedes them in the files, so they wait in temporary files beside these.
+pub(crate) struct CloudWriter {
+    path: PathBuf,
+    points: BufWriter<NamedTempFile>,
+    views: BufWriter<NamedTempFile>,
+    count: usize,
+}
+
+impl CloudWriter {
+    /// A cloud without points yet, for this PLY file; `PATH.vis` gets the views.
+    ///
+    /// # Errors
+    /// A folder in which no file can be made.
+    pub(crate) fn new(path: &Path) -> Result<CloudWriter> {
+        let temporary = || -> Result<BufWriter<NamedTempFile>> {
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+            let file = NamedTempFile::new_in(folder.unwrap_or(Path::new(".")));
+            Ok(BufWriter::new(file.map_err(|error| cannot_be_written(path, error))?))
+        };
+        Ok(CloudWriter { path: path.to_owned(), points: temporary()?, views: temporary()?, count: 0 })
+    }
+
+    /// Adds points.
+    ///
+    /// # Errors
+    /// A full disk, for example.
+    pub(crate) fn add(&mut self, cloud: &PointCloud) -> Result<()> {
+        self.count += cloud.positions.len();
+        let written = write_points(&mut self.points, cloud);
+        let written = written.and_then(|()| write_lists(&mut self.views, &cloud.views));
+        written.map_err(|error| cannot_be_written(&self.path, error))
+    }
+
+    /// Writes both files and returns the number of points.
+    ///
+    /// # Errors
+    /// A full disk, for example.
+    pub(crate) fn finish(self) -> Result<usize> {
+        let CloudWriter { path, points, views, count } = self;
+        let rewound = |file: BufWriter<NamedTempFile>| -> io::Result<NamedTempFile> {
+            let mut file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
+            file.rewind()?;
+            Ok(file)
+        };
+        let both = rewound(points).and_then(|points| Ok((points, rewound(views)?)));
+        let (mut points, mut views) = both.map_err(|error| cannot_be_written(&path, error))?;
+        write_file(&path, |out| {
+            Writer::<Vertex>::new().write_header(out, &header(count))?;
+            io::copy(&mut points, out).map(drop)
+        })?;
+        write_file(&visibility_path(&path), |out| {
+            out.write_all(&(count as u64).to_le_bytes())?;
+            io::copy(&mut views, out).map(drop)
+        })?;
+        Ok(count)
+    }
+}
+
+/// The file with the views of the points of a cloud.
+pub(crate) fn visibility_path(cloud: &Path) -> PathBuf {
+    let mut path = cloud.as_os_str().to_owned();
+    path.push(".vis");
+    path.into()
 }
 
 /// Reads the clouds that [`write_ply`] and COLMAP write. The lists of views are empty: they are in another
@@ -141,15 +213,20 @@ pub fn read_ply(path: &Path) -> Result<PointCloud> {
 pub fn write_visibility(path: &Path, views: &PointViews) -> Result<()> {
     write_file(path, |out| {
         out.write_all(&(views.len() as u64).to_le_bytes())?;
-        for point in 0..views.len() {
-            let views = views.get(point);
-            out.write_all(&(views.len() as u32).to_le_bytes())?;
-            for view in views {
-                out.write_all(&view.to_le_bytes())?;
-            }
-        }
-        Ok(())
+        write_lists(out, views)
     })
+}
+
+/// Writes the lists of views without their number.
+fn write_lists(out: &mut impl Write, views: &PointViews) -> io::Result<()> {
+    for point in 0..views.len() {
+        let views = views.get(point);
+        out.write_all(&(views.len() as u32).to_le_bytes())?;
+        for view in views {
+            out.write_all(&view.to_le_bytes())?;
+        }
+    }
+    Ok(())
 }
 
 /// Reads the views of each point from a file in the layout of [`write_visibility`].

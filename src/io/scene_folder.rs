@@ -40,6 +40,14 @@ impl SceneFolder {
     /// # Errors
     /// A missing or damaged file; another size than the camera's.
     pub fn read_picture(&self, name: &str, camera: &Camera) -> Result<Picture> {
+        read_picture(&self.photograph(name, camera)?)
+    }
+
+    /// The file of one image of the model; checks its size, and decodes nothing.
+    ///
+    /// # Errors
+    /// A missing or damaged file; another size than the camera's.
+    pub fn photograph(&self, name: &str, camera: &Camera) -> Result<PathBuf> {
         let path = self.images.join(name);
         if !path.is_file() {
             let sparse = self.sparse.display();
@@ -53,7 +61,7 @@ impl SceneFolder {
             let expected = format!("{}x{}, the size of its camera in the model", camera.width, camera.height);
             return Err(Error::file(&path, format!("the picture is {width}x{height}; expected {expected}")));
         }
-        read_picture(&path)
+        Ok(path)
     }
 }
 

@@ -5,7 +5,7 @@ use super::colmap_maps::{
 };
 use super::colmap_model::ColmapModel;
 use super::files::{NAME_INSIDE, cannot_be_read, copy_file, link_or_copy, stays_inside, write_file};
-use super::ply::{write_ply, write_visibility};
+use super::ply::{visibility_path, write_ply, write_visibility};
 use super::previews::{
     write_depth_preview, write_fraction_preview, write_normal_preview, write_views_preview,
 };
@@ -99,6 +99,14 @@ impl Workspace {
         self.folder.join("stereo").join(what).join(format!("{name}.{}.bin", kind.colmap_name()))
     }
 
+    /// The files that [`Workspace::write_view`] writes for a view.
+    pub fn view_files(&self, name: &str) -> Vec<PathBuf> {
+        let kinds = [MapKind::Raw, MapKind::Validated];
+        let maps = ["depth_maps", "normal_maps", "confidence_maps", "consistency_graphs"];
+        let maps = kinds.into_iter().flat_map(|kind| maps.map(|what| self.map(what, name, kind)));
+        maps.chain(["depth", "normal", "views", "confidence"].map(|what| self.preview(name, what))).collect()
+    }
+
     /// Returns an error for a view's name whose files would be outside the folder.
     pub fn check_name(name: &str) -> Result<()> {
         if stays_inside(name) { Ok(()) } else { Err(Error::argument("view's name", name, NAME_INSIDE)) }
@@ -186,9 +194,7 @@ impl Workspace {
     /// Writes `fused.ply` and `fused.ply.vis`, or another PLY file and its `.vis` beside it.
     pub fn write_cloud(path: &Path, cloud: &PointCloud) -> Result<()> {
         write_ply(path, cloud)?;
-        let mut visibility = path.as_os_str().to_owned();
-        visibility.push(".vis");
-        write_visibility(Path::new(&visibility), &cloud.views)
+        write_visibility(&visibility_path(path), &cloud.views)
     }
 
     /// Reads depth and normal map of one view.

@@ -9,6 +9,7 @@ mod schedule;
 mod value;
 
 use crate::error::{Error, Result};
+use crate::memory::parse_bytes;
 use crate::simd::SimdLevel;
 use groups::GROUPED;
 pub use groups::{
@@ -32,6 +33,10 @@ pub struct Options {
     pub seed: u64,
     /// Worker threads, 0 to 4096; 0 takes one for each core. The result does not depend on it.
     pub threads: usize,
+    /// Bytes of memory that a run in a folder keeps to; 0 takes three quarters of what the machine or its
+    /// control group allows. The result does not depend on it. Runs without a folder keep everything in
+    /// memory.
+    pub memory: u64,
     /// Instruction set of the kernels; `None` takes the best that the machine supports. The result does not
     /// depend on it.
     pub simd: Option<SimdLevel>,
@@ -81,6 +86,9 @@ const SCALES: OptionInfo = OptionInfo {
     kind: Kind::Text,
 };
 
+/// The option whose text may have a unit.
+const MEMORY: &str = "memory";
+
 /// The options outside the groups that are numbers.
 const OTHERS: &[Entry] = &[
     Entry {
@@ -90,6 +98,15 @@ const OTHERS: &[Entry] = &[
         kind: Kind::Count { min: 0, max: 4096 },
         get: |options| options.threads as f64,
         set: |options, value| options.threads = value as usize,
+    },
+    Entry {
+        c_name: c"memory",
+        explanation: "Bytes of memory that a run in a folder keeps to; 0 takes three quarters of what the \
+                      machine or its control group allows. The result does not depend on it.",
+        unit: "bytes",
+        kind: Kind::Count { min: 0, max: MAX_EXACT },
+        get: |options| options.memory as f64,
+        set: |options, value| options.memory = value as u64,
     },
     Entry {
         c_name: c"schedule.min_changed_fraction",
@@ -138,8 +155,8 @@ impl Options {
 
     /// All options, in the order in which they are listed: name, explanation, unit and values of each.
     pub fn infos() -> impl Iterator<Item = OptionInfo> {
-        let [threads, min_changed] = [&OTHERS[0], &OTHERS[1]].map(Entry::info);
-        [SEED, threads, SIMD, SCALES, min_changed].into_iter().chain(GROUPED.iter().map(Entry::info))
+        let [threads, memory, min_changed] = [0, 1, 2].map(|index: usize| OTHERS[index].info());
+        [SEED, threads, memory, SIMD, SCALES, min_changed].into_iter().chain(GROUPED.iter().map(Entry::info))
     }
 
     /// The groups with a sentence on each, in the order of the options.
@@ -225,6 +242,8 @@ impl Options {
                 )));
             }
             self.simd = level;
+        } else if info.name == MEMORY {
+            self.set_number(MEMORY, parse_bytes(text)? as f64)?;
         } else if info == SCALES {
             let before = std::mem::replace(&mut self.schedule.scales, scales_from_text(text)?);
             if let Err(error) = self.check_scales() {

@@ -29,6 +29,7 @@ impl Options {
         Options {
             seed: 0,
             threads: 0,
+            memory: 0,
             simd: None,
             schedule: ScheduleOptions {
                 // FoodNumber is the paper's; it never gives its numbers of iterations and cycles.

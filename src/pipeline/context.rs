@@ -74,6 +74,13 @@ impl RunContext {
         })
     }
 
+    /// The same with another limit of the images in memory, none of which is kept.
+    #[cfg(feature = "io")]
+    pub(super) fn limited_to(mut self, limit: usize) -> RunContext {
+        self.images = self.images.limited_to(limit);
+        self
+    }
+
     /// The cycles in order.
     pub(super) fn cycles(&self) -> &[Cycle] {
         &self.cycles

@@ -47,6 +47,7 @@ pub(crate) struct Place {
 
 /// What one cycle did to one view.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "io", derive(serde::Serialize, serde::Deserialize))]
 pub struct CycleRecord {
     /// Size of the images: 1 is full, 2 half, 4 a quarter.
     pub downscale: u32,

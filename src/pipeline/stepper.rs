@@ -1,7 +1,7 @@
 //! The public stepwise interface: checks the arguments and calls the stages.
 
 use super::context::RunContext;
-use super::cycle::{Cycle, Place};
+use super::cycle::{Cycle, CycleRecord, Place};
 use super::estimate::{Checked, EstimateRef, OwnMaps, Searched, ViewEstimate};
 use super::progress::Tracker;
 use super::result::ViewResult;
@@ -44,6 +44,21 @@ impl Stepper {
     /// An option out of its range, named.
     pub fn new(scene: &Scene, options: &Options) -> Result<Stepper> {
         RunContext::new(scene, options, &|_| Ok(())).map(Stepper)
+    }
+
+    /// Like [`Stepper::new`], but photographs are decoded when they are needed, and packed images of up to
+    /// `limit` bytes stay in memory.
+    ///
+    /// # Errors
+    /// An option out of its range, named.
+    pub fn with_image_limit(scene: &Scene, options: &Options, limit: usize) -> Result<Stepper> {
+        RunContext::with_image_limit(scene, options, limit).map(Stepper)
+    }
+
+    /// The same with another limit of the packed images in memory.
+    #[cfg(feature = "io")]
+    pub(crate) fn limited_to(self, limit: usize) -> Stepper {
+        Stepper(self.0.limited_to(limit))
     }
 
     /// The cycles in order.
@@ -186,6 +201,21 @@ impl Stepper {
         Ok(self
             .0
             .next_cycle(cycle, estimates.iter().copied().flatten().filter_map(|own| own.cycles().last())))
+    }
+
+    /// Like [`Stepper::next`], from the last record of every view.
+    ///
+    /// # Errors
+    /// A cycle that does not exist.
+    pub fn next_after(&self, cycle: usize, records: &[CycleRecord]) -> Result<Option<usize>> {
+        self.0.check_place(Place { cycle, view: 0 })?;
+        Ok(self.0.next_cycle(cycle, records.iter()))
+    }
+
+    #[cfg(feature = "io")]
+    /// Units of work of searching all views in the cycles before this one; see [`Cycle::work`].
+    pub(crate) fn work_before(&self, cycle: usize) -> u64 {
+        self.0.work_before(cycle)
     }
 
     /// The result of a view after the last cycle: averages validated planes across views, fills small gaps

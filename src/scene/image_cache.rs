@@ -2,9 +2,9 @@
 
 use crate::error::Result;
 use crate::image::{PackedImage, Photograph, Picture};
+use crate::memory::Cache;
 use rayon::prelude::*;
-use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 /// Packed images by scale and view. Shared by threads.
 #[derive(Debug)]
@@ -12,38 +12,34 @@ pub(crate) struct ImageCache {
     photographs: Vec<Photograph>,
     /// The power of two by which each scale is reduced.
     downscales: Vec<u32>,
-    /// Bytes of the images that are kept at most.
-    limit: usize,
-    kept: Mutex<Kept>,
-}
-
-/// The images that are in memory.
-#[derive(Debug, Default)]
-struct Kept {
-    /// By scale index and view, with the time of the last use.
-    images: HashMap<(usize, usize), (Arc<PackedImage>, u64)>,
-    bytes: usize,
-    uses: u64,
+    /// By scale index and view.
+    kept: Cache<(usize, usize), PackedImage>,
 }
 
 impl ImageCache {
     /// An empty cache that keeps images of up to `limit` bytes.
     pub(crate) fn new(photographs: Vec<Photograph>, downscales: Vec<u32>, limit: usize) -> ImageCache {
-        ImageCache { photographs, downscales, limit, kept: Mutex::default() }
+        ImageCache { photographs, downscales, kept: Cache::new(limit) }
     }
 
-    /// The packed image of a view on a scale. Those used longest ago make room for it.
+    /// An empty cache of the same images with another limit.
+    #[cfg(feature = "io")]
+    pub(crate) fn limited_to(self, limit: usize) -> ImageCache {
+        ImageCache { kept: Cache::new(limit), ..self }
+    }
+
+    /// The packed image of a view on a scale.
     ///
     /// # Errors
     /// A photograph that cannot be decoded.
     pub(crate) fn get(&self, scale: usize, view: usize) -> Result<Arc<PackedImage>> {
-        if let Some(image) = self.kept().touch((scale, view)) {
+        if let Some(image) = self.kept.get((scale, view)) {
             return Ok(image);
         }
         // Outside of the lock: other threads decode at the same time, now and then the same image.
         let picture = self.photographs[view].load()?;
         let image = Arc::new(reduced(picture, self.downscales[scale]));
-        self.kept().insert((scale, view), &image, self.limit);
+        self.kept.insert((scale, view), image.clone(), image.bytes());
         Ok(image)
     }
 
@@ -59,33 +55,6 @@ impl ImageCache {
             before()?;
             self.get(scale, view).map(drop)
         })
-    }
-
-    fn kept(&self) -> MutexGuard<'_, Kept> {
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Kept {
-    fn touch(&mut self, key: (usize, usize)) -> Option<Arc<PackedImage>> {
-        self.uses += 1;
-        let (image, last_use) = self.images.get_mut(&key)?;
-        *last_use = self.uses;
-        Some(image.clone())
-    }
-
-    fn insert(&mut self, key: (usize, usize), image: &Arc<PackedImage>, limit: usize) {
-        self.uses += 1;
-        if self.images.insert(key, (image.clone(), self.uses)).is_none() {
-            self.bytes += image.bytes();
-        }
-        while self.bytes > limit {
-            let oldest = self.images.iter().min_by_key(|(_, (_, last_use))| *last_use);
-            let Some(key) = oldest.map(|(key, _)| *key) else { break };
-            if let Some((image, _)) = self.images.remove(&key) {
-                self.bytes -= image.bytes();
-            }
-        }
     }
 }
 
@@ -138,7 +107,7 @@ mod tests {
         let limited = cache(&sources, 2 * bytes);
         for view in [0, 1, 0, 2, 0, 1] {
             assert_eq!(limited.get(1, view).unwrap().gray(0, 0), 7);
-            assert!(limited.kept().bytes <= 2 * bytes);
+            assert!(limited.kept.bytes() <= 2 * bytes);
         }
         assert_eq!(decoded(), [3, 4, 3], "view 1 made room for view 2");
     }
@@ -148,6 +117,6 @@ mod tests {
         let sources = [Arc::new(Counted::default())];
         let cache = cache(&sources, 0);
         assert_eq!(cache.get(1, 0).unwrap().width, 8);
-        assert!(cache.kept().images.is_empty());
+        assert_eq!(cache.kept.bytes(), 0);
     }
 }

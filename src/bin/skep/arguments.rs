@@ -2,6 +2,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use skep::{DepthRange, FusionOptions, Options, Result};
+use std::ops::Range;
 use std::path::PathBuf;
 
 #[derive(Parser)]
@@ -16,6 +17,17 @@ pub enum Command {
     /// Estimate depth, normal and source-view maps of a scene and fuse them into a cloud
     #[command(after_help = RECONSTRUCT_HELP)]
     Reconstruct(Reconstruct),
+    /// Plan a run in a folder, whose tasks other processes or machines then do
+    #[command(after_help = PLAN_HELP)]
+    Plan(Plan),
+    /// Task of a planned run: search views in a cycle
+    Search(Views),
+    /// Task of a planned run: check views in a cycle, after all were searched
+    Check(Views),
+    /// Task of a planned run: decide which cycle follows, after all views were checked
+    Next(NextCycle),
+    /// Task of a planned run: write the maps of views, after the last cycle
+    Finish(FinishViews),
     /// Fuse existing depth and normal maps, of skep or of COLMAP, into a cloud
     #[command(after_help = FUSE_HELP)]
     Fuse(Fuse),
@@ -24,7 +36,7 @@ pub enum Command {
 }
 
 #[derive(Args)]
-pub struct Reconstruct {
+pub struct Run {
     /// Folder with images/ and a COLMAP model in sparse/ or sparse/0/
     pub scene: PathBuf,
     /// Folder of the results [default: SCENE/dense]
@@ -58,12 +70,100 @@ pub struct Reconstruct {
     /// with 3 food sources a pixel, 5 iterations in the first cycle and 4 more cycles of 1, then full size
     #[arg(long, value_name = "SCALES")]
     schedule: Option<String>,
-    /// Also write the maps of every cycle as pictures into DIR, to study the method; slower, same result
-    #[arg(long, value_name = "DIR")]
-    pub dump: Option<PathBuf>,
+    /// Memory to keep to, such as 8GiB; the result does not depend on it [default: three quarters of what
+    /// the machine or its control group allows]
+    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    memory: Option<u64>,
+    /// Begin anew where a run in the folder would go on
+    #[arg(long)]
+    pub fresh: bool,
     /// Print warnings and errors only
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+#[derive(Args)]
+pub struct Reconstruct {
+    #[command(flatten)]
+    pub run: Run,
+    /// Also write the maps of every cycle as pictures into DIR, to study the method; slower, same result
+    #[arg(long, value_name = "DIR")]
+    pub dump: Option<PathBuf>,
+}
+
+#[derive(Args)]
+pub struct Plan {
+    #[command(flatten)]
+    pub run: Run,
+}
+
+/// A planned run and how to work on it.
+#[derive(Args)]
+pub struct Planned {
+    /// Folder of the run, as planned by `skep plan`
+    pub folder: PathBuf,
+    /// Worker threads; 0 uses one for each core
+    #[arg(short, long, value_name = "N", default_value_t = 0)]
+    threads: usize,
+    /// Memory to keep to, such as 8GiB [default: three quarters of what the machine allows]
+    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    memory: Option<u64>,
+    /// Print warnings and errors only
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+#[derive(Args)]
+pub struct Views {
+    #[command(flatten)]
+    pub planned: Planned,
+    /// The cycle, counted from 0; one that the run skips takes no time
+    #[arg(long, value_name = "N")]
+    pub cycle: usize,
+    /// The views from A to before B, counted from 0 [default: all]
+    #[arg(long, value_name = "A..B", value_parser = range)]
+    pub views: Option<Range<usize>>,
+}
+
+#[derive(Args)]
+pub struct NextCycle {
+    #[command(flatten)]
+    pub planned: Planned,
+    /// The cycle whose views are all checked
+    #[arg(long, value_name = "N")]
+    pub cycle: usize,
+}
+
+#[derive(Args)]
+pub struct FinishViews {
+    #[command(flatten)]
+    pub planned: Planned,
+    /// The views from A to before B, counted from 0 [default: all]
+    #[arg(long, value_name = "A..B", value_parser = range)]
+    pub views: Option<Range<usize>>,
+}
+
+impl Planned {
+    /// The options that do not change the result.
+    pub fn options(&self) -> Options {
+        Options { threads: self.threads, memory: self.memory.unwrap_or(0), ..Options::default() }
+    }
+}
+
+/// A size in bytes.
+fn bytes(text: &str) -> std::result::Result<u64, String> {
+    skep::parse_bytes(text).map_err(|error| error.to_string())
+}
+
+/// `A..B`, or `A` for one view.
+fn range(text: &str) -> std::result::Result<Range<usize>, String> {
+    let number =
+        |text: &str| text.trim().parse::<usize>().map_err(|_| "expected A..B, such as 0..16".to_owned());
+    let (start, end) = match text.split_once("..") {
+        Some((start, end)) => (number(start)?, number(end)?),
+        None => (number(text)?, number(text)? + 1),
+    };
+    if start < end { Ok(start..end) } else { Err("expected A..B with A below B, such as 0..16".to_owned()) }
 }
 
 /// `NAME=VALUE`.
@@ -111,7 +211,7 @@ pub struct Fuse {
     pub quiet: bool,
 }
 
-impl Reconstruct {
+impl Run {
     /// The folder of the results.
     pub fn output(&self) -> PathBuf {
         self.output.clone().unwrap_or_else(|| self.scene.join("dense"))
@@ -122,6 +222,7 @@ impl Reconstruct {
         let mut options = Options::preset(&self.preset)?;
         options.threads = self.threads;
         options.seed = self.seed;
+        options.memory = self.memory.unwrap_or(0);
         for part in &self.without {
             match part {
                 Part::ViewSelection => options.view_selection.pixelwise_view_selection = false,
@@ -174,6 +275,7 @@ const EXAMPLES: &str = "\
 Examples:
   skep reconstruct SCENE            maps and cloud of a scene, into SCENE/dense
   skep fuse SCENE/dense             the cloud alone, from existing maps
+  skep plan SCENE -o RUN            a run for other processes and machines to do
   skep info                         the options and their values in the presets
   skep info sigma_color             explanation of one option
   skep help reconstruct             input and output files, and remedies of failures
@@ -201,6 +303,8 @@ Results, in COLMAP's layouts:
   images, sparse                   copy of the scene, for COLMAP: the folder is a workspace
                                    of `colmap stereo_fusion --workspace_path DIR ...`
   report.json                      counts, times and options; written last
+  run/                             what is done of the run: the same command goes on after an
+                                   interruption (Ctrl-C, a crash, a full disk), --fresh begins anew
 
 Examples:
   skep reconstruct SCENE --output RESULT --threads 4
@@ -218,6 +322,21 @@ When it fails:
     preview/NAME.views.png shows where too few views see the surface.
   surfaces missing beyond some distance: they are outside the depth range; report.json has the range
     as depth_min and depth_max, --depth-range MIN MAX sets it.";
+
+const PLAN_HELP: &str = "\
+A run is a set of tasks. `skep reconstruct` does all of them; a scheduler does them in this order, those of
+a line at the same time if it likes, on machines that share the folder of the run:
+
+  skep plan SCENE -o RUN
+  for each cycle N, counted from 0:
+    skep search RUN --cycle N --views A..B      all views
+    skep check RUN --cycle N --views A..B       all views, after the searches of the cycle
+    skep next RUN --cycle N                     after the checks of the cycle
+  skep finish RUN --views A..B                  all views, after the last cycle
+  skep fuse RUN                                 after all views are finished
+
+A task that is done, or of a cycle that the run skips, succeeds at once: tasks may be repeated.
+`skep plan` prints the tasks, with the files that each range of views reads.";
 
 const FUSE_HELP: &str = "\
 The workspace is what `skep reconstruct` or `colmap patch_match_stereo` writes: stereo/depth_maps and

@@ -10,6 +10,7 @@ mod reconstruct;
 mod report;
 mod stopwatch;
 mod streams;
+mod tasks;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
@@ -26,6 +27,11 @@ const INTERRUPTED: u8 = 130;
 fn main() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Reconstruct(arguments) => reconstruct::run(&arguments),
+        Command::Plan(arguments) => tasks::plan(&arguments),
+        Command::Search(arguments) => tasks::search(&arguments),
+        Command::Check(arguments) => tasks::check(&arguments),
+        Command::Next(arguments) => tasks::next(&arguments),
+        Command::Finish(arguments) => tasks::finish(&arguments),
         Command::Fuse(arguments) => fuse::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
     };

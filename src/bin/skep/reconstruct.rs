@@ -1,17 +1,16 @@
 //! `skep reconstruct`: maps, previews, cloud and report of a scene folder.
 
-use crate::arguments::Reconstruct;
-use crate::dump;
+use crate::arguments::{Reconstruct, Run};
 use crate::interrupt::Interrupt;
 use crate::progress::Display;
 use crate::report::{Report, Totals};
 use crate::stopwatch::{Stage, Stopwatch};
 use crate::{Failure, streams};
-use rayon::prelude::*;
-use skep::io::{SceneFolder, Workspace, read_scene};
-use skep::{DepthRange, Error, Options, PixelStatus, Progress, ProgressFn, Reconstruction, Result, Scene};
+use crate::{dump, info};
+use skep::io::Workspace;
+use skep::job::{Job, Needs, Summary};
+use skep::{DepthRange, Error, Options, PixelStatus, Progress, Result, Scene, format_bytes};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// Points for each unmasked pixel below which a cloud is thin. A point takes the pixel of every view that
@@ -23,135 +22,106 @@ const LARGE_SHARE: f64 = 10.0;
 
 /// Runs the command.
 pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
-    let depth_range = arguments.depth_range().map_err(Failure::Usage)?;
-    let options = arguments.options().map_err(Failure::Usage)?;
-    options.check().map_err(Failure::Usage)?;
-    let output = arguments.output();
-
+    let run = &arguments.run;
     let stopwatch = Mutex::new(Stopwatch::start());
-    let display = Display::new(arguments.quiet);
-    display.print(&format!("reading {}", arguments.scene.display()));
-    let scene = read_scene(&arguments.scene, depth_range)?;
-    scene.warnings().iter().for_each(|warning| streams::warning(warning));
-    require_writable(&output)?;
+    let display = Display::new(run.quiet);
+    let job = plan(run, display)?;
     if let Some(folder) = &arguments.dump {
         require_writable(folder)?;
     }
-
+    let output = run.output();
     let interrupt = Interrupt::watch();
-    let estimate = |progress: ProgressFn| match &arguments.dump {
-        Some(folder) => {
-            pool(options.threads)?.install(|| dump::reconstruct(&scene, &options, folder, progress))
+    // A report says that the files beside it are complete and of this run.
+    let report = report_path(&output);
+    if let Err(error) = std::fs::remove_file(&report)
+        && error.kind() != std::io::ErrorKind::NotFound
+    {
+        return Err(Error::file(report, format!("cannot be replaced: {error}")).into());
+    }
+    let result = with_progress(&job, arguments, display, &stopwatch, &interrupt).inspect_err(|error| {
+        if *error == Error::Cancelled {
+            streams::notice("interrupted: what is done is kept, and the same command goes on from there");
         }
-        None => skep::reconstruct(&scene, &options, progress),
-    };
-    let kept = match &arguments.dump {
-        Some(_) => "the pictures of the finished cycles are complete, nothing else was written",
-        None => "nothing was written",
-    };
-    let result = with_progress(&estimate, display, &stopwatch, &interrupt)
-        .inspect_err(|error| explain_interruption(error, kept))?;
+    })?;
     result.warnings.iter().for_each(|warning| streams::warning(warning));
 
     let mut stopwatch = stopwatch.into_inner().unwrap_or_else(PoisonError::into_inner);
     stopwatch.enter(Stage::Writing);
-    display.print(&format!("writing {}", output.display()));
-    let mut report = Report::new(&scene, &arguments.preset, &options, &result);
+    let mut report = Report::new(&job, &run.preset, &result);
+    let scene = job.scene();
     let ranges: Vec<DepthRange> = (0..scene.views().len()).map(|view| scene.depth_range(view)).collect();
-    let empty = (report.totals.points == 0).then(|| empty_cloud(&report.totals, &ranges, &options));
+    let empty = (report.totals.points == 0).then(|| empty_cloud(&report.totals, &ranges, job.options()));
     report.warnings.extend(empty.clone());
-    let writers = pool(options.threads)?;
-    writers.install(|| write(&output, &arguments.scene, &scene, &result, &interrupt))?;
     report.set_times(stopwatch.times());
     report.write(&report_path(&output))?;
 
     empty.iter().for_each(|warning| streams::warning(warning));
-    if !arguments.quiet {
-        summary(&output, &scene, &ranges, &report.totals).iter().for_each(|line| streams::result(line));
+    if !run.quiet {
+        summary(&output, scene, &ranges, &report.totals).iter().for_each(|line| streams::result(line));
     }
     Ok(())
 }
 
-/// Estimates and fuses; measures the times, displays the progress, and ends early when interrupted.
+/// Plans the run, and says what became of an earlier one and what this one needs.
+pub fn plan(run: &Run, display: Display) -> std::result::Result<Job, Failure> {
+    let depth_range = run.depth_range().map_err(Failure::Usage)?;
+    let options = run.options().map_err(Failure::Usage)?;
+    options.check().map_err(Failure::Usage)?;
+    display.print(&format!("reading {}", run.scene.display()));
+    let job = Job::plan(&run.scene, depth_range, &options, &run.output(), run.fresh)?;
+    job.notices().iter().for_each(|notice| streams::warning(notice));
+    job.scene().warnings().iter().for_each(|warning| streams::warning(warning));
+    display.print(&needs(&job));
+    Ok(job)
+}
+
+/// What the run needs, in a line.
+fn needs(job: &Job) -> String {
+    let Needs { least_memory, memory, disk, cpu_seconds } = job.needs();
+    let threads = if job.options().threads == 0 { info::cores() } else { job.options().threads };
+    let seconds = cpu_seconds / threads as f64;
+    let time = match seconds {
+        ..100.0 => format!("{seconds:.0} s"),
+        ..6000.0 => format!("{:.0} min", seconds / 60.0),
+        _ => format!("{:.1} h", seconds / 3600.0),
+    };
+    format!(
+        "{} views; about {time} on {threads} threads, up to {} of memory (at least {}) and {} on disk",
+        job.scene().views().len(),
+        format_bytes(memory),
+        format_bytes(least_memory),
+        format_bytes(disk)
+    )
+}
+
+/// Does the run; measures the times, displays the progress, and ends early when interrupted.
 fn with_progress(
-    estimate: &dyn Fn(ProgressFn) -> Result<Reconstruction>,
+    job: &Job,
+    arguments: &Reconstruct,
     display: Display,
     stopwatch: &Mutex<Stopwatch>,
     interrupt: &Interrupt,
-) -> Result<Reconstruction> {
+) -> Result<Summary> {
     let reporter = display.start();
     let progress = |progress: &Progress| {
         stopwatch.lock().unwrap_or_else(PoisonError::into_inner).enter(progress.phase.into());
         reporter.show(progress);
         interrupt.control_flow()
     };
-    estimate(&progress)
+    match &arguments.dump {
+        Some(folder) => job.run_observed(&progress, &|cycle| dump::write(job, cycle, folder)),
+        None => job.run(&progress),
+    }
 }
 
-/// Checks that results can be written before the run, which may take hours.
+/// Checks that pictures can be written before the run, which may take hours.
 fn require_writable(folder: &Path) -> Result<()> {
     let attempt = std::fs::create_dir_all(folder).and_then(|()| tempfile::tempfile_in(folder));
     attempt.map(drop).map_err(|error| Error::file(folder, format!("cannot be written to: {error}")))
 }
 
-/// Writes every file, the report excepted, on the threads of the current pool; stops between two views when
-/// interrupted.
-fn write(
-    output: &Path,
-    folder: &Path,
-    scene: &Scene,
-    result: &Reconstruction,
-    interrupt: &Interrupt,
-) -> Result<()> {
-    // A report implies that the files beside it are complete and of the same run: an older one is removed
-    // first.
-    let report = report_path(output);
-    match std::fs::remove_file(&report) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-            return Err(Error::file(report, format!("cannot be replaced: {error}")));
-        }
-        _ => (),
-    }
-    let workspace = Workspace::new(output);
-    let written = AtomicUsize::new(0);
-    let views = scene.views().par_iter().zip(&result.views).with_max_len(1);
-    let all = views.try_for_each(|(view, result)| {
-        interrupt.check()?;
-        workspace.write_view(&view.name, &view.camera, result)?;
-        written.fetch_add(1, Ordering::Relaxed);
-        Ok(())
-    });
-    all.inspect_err(|error| {
-        let written = written.load(Ordering::Relaxed);
-        let kept = format!("the files of {written} of {} views are complete", scene.views().len());
-        explain_interruption(error, &kept);
-    })?;
-    let kept = "the maps of all views are complete; `skep fuse` makes the cloud from them";
-    interrupt.check().inspect_err(|error| explain_interruption(error, kept))?;
-    workspace.write_lists(scene.views().iter().map(|view| view.name.as_str()))?;
-    workspace.adopt(&SceneFolder::find(folder)?)?;
-    Workspace::write_cloud(&workspace.cloud(), &result.points)
-}
-
-/// A thread pool for work outside the library; 0 starts one thread for each core. The pool for writing is
-/// started after that of the library has ended, and reuses its memory. If no thread can be started, the
-/// current one does the work, so that the estimates are not lost.
-fn pool(threads: usize) -> Result<rayon::ThreadPool> {
-    let expected = "a number of threads that the system can start";
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.or_else(|_| rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build());
-    pool.map_err(|error| Error::argument("--threads", threads, format!("{expected} ({error})")))
-}
-
 fn report_path(output: &Path) -> PathBuf {
     output.join("report.json")
-}
-
-/// Prints which files an interruption leaves. Other errors have a text of their own.
-fn explain_interruption(error: &Error, kept: &str) {
-    if *error == Error::Cancelled {
-        streams::notice(&format!("interrupted: {kept}"));
-    }
 }
 
 /// The last lines: the written files and, if the cloud is empty or thin, the reasons.

@@ -5,10 +5,9 @@ use crate::info;
 use crate::stopwatch::Times;
 use serde::Serialize;
 use serde_json::Value;
+use skep::job::{Job, Summary, ViewSummary};
 use skep::simd::SimdLevel;
-use skep::{
-    Counts, CycleRecord, OptionValue, Options, PixelStatus, Reconstruction, Result, Scene, ViewResult,
-};
+use skep::{Counts, CycleRecord, OptionValue, PixelStatus, Result, Scene};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
@@ -75,9 +74,10 @@ pub struct CycleReport {
 
 impl Report {
     /// Collects everything but the times, which [`Report::set_times`] sets.
-    pub fn new(scene: &Scene, preset: &str, options: &Options, result: &Reconstruction) -> Report {
+    pub fn new(job: &Job, preset: &str, result: &Summary) -> Report {
+        let (scene, options) = (job.scene(), job.options());
         let views =
-            result.views.iter().enumerate().map(|(index, view)| view_report(scene, index, view)).collect();
+            result.views.iter().enumerate().map(|(index, view)| view_report(job, index, view)).collect();
         Report {
             version: env!("CARGO_PKG_VERSION"),
             simd: options.simd.unwrap_or_else(SimdLevel::detect).name(),
@@ -119,13 +119,13 @@ fn typed(value: OptionValue) -> Value {
     }
 }
 
-fn totals(scene: &Scene, result: &Reconstruction) -> Totals {
+fn totals(scene: &Scene, result: &Summary) -> Totals {
     let mut counts = Counts::default();
     let mut status_counts = [0; PixelStatus::ALL.len()];
     let mut cycles: Vec<CycleRecord> = Vec::new();
     for view in &result.views {
         counts += view.counts;
-        for (total, count) in status_counts.iter_mut().zip(view.status_counts()) {
+        for (total, count) in status_counts.iter_mut().zip(view.status_counts) {
             *total += count;
         }
         for cycle in &view.cycles {
@@ -142,7 +142,7 @@ fn totals(scene: &Scene, result: &Reconstruction) -> Totals {
         bilinear_samples: counts.bilinear_samples,
         early_terminations: counts.early_terminations,
         cycles: cycles.iter().map(CycleReport::from).collect(),
-        points: result.points.positions.len(),
+        points: result.points,
         wall_seconds: 0.0,
         cpu_seconds: 0.0,
         peak_resident_bytes: None,
@@ -162,7 +162,8 @@ fn add_cycle(cycles: &mut Vec<CycleRecord>, cycle: &CycleRecord) {
     }
 }
 
-fn view_report(scene: &Scene, index: usize, result: &ViewResult) -> ViewReport {
+fn view_report(job: &Job, index: usize, result: &ViewSummary) -> ViewReport {
+    let scene = job.scene();
     let view = &scene.views()[index];
     let range = scene.depth_range(index);
     ViewReport {
@@ -172,9 +173,14 @@ fn view_report(scene: &Scene, index: usize, result: &ViewResult) -> ViewReport {
         pixels: view.camera.pixels() as u64,
         depth_min: range.near,
         depth_max: range.far,
-        sources: result.sources.iter().map(|&source| scene.views()[source as usize].name.clone()).collect(),
-        status_counts: by_name(result.status_counts()),
-        outcomes: by_name(result.status_counts()),
+        sources: job
+            .stepper()
+            .sources(index)
+            .iter()
+            .map(|&source| scene.views()[source as usize].name.clone())
+            .collect(),
+        status_counts: by_name(result.status_counts),
+        outcomes: by_name(result.status_counts),
         ncc_evaluations: result.counts.ncc_evaluations,
         bilinear_samples: result.counts.bilinear_samples,
         early_terminations: result.counts.early_terminations,

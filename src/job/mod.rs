@@ -1,0 +1,413 @@
+//! Runs in a folder: larger than memory, resumed after an interruption, divided among processes and machines.
+//!
+//! A run is a set of [tasks](Task). What a task writes is complete or absent, and a record tells that the
+//! task is done, with a fingerprint of each file. So a run that ended early (a crash, a full disk, Ctrl-C)
+//! goes on where it stopped, with the same bits; and any scheduler may run the tasks of one kind and cycle at
+//! the same time, on machines that share the folder. Estimates of views are read when a task needs them, and
+//! kept in memory as far as the option `memory` allows.
+//!
+//! The folder is also the workspace with the results: see [`crate::io::Workspace`].
+
+mod estimates;
+mod fingerprint;
+mod folder;
+mod fuse;
+mod manifest;
+mod meter;
+mod needs;
+mod photograph;
+mod plan;
+mod run;
+mod task;
+
+use crate::error::{Error, Result};
+use crate::fusion::{fuse_input, overlaps};
+use crate::geometry::DepthRange;
+use crate::io::{CloudWriter, ColmapModel, SceneFolder, Workspace, visibility_path};
+use crate::options::Options;
+use crate::parallel::{JoinedPool, ProgressFn};
+use crate::pipeline::{Checked, CycleRecord, EstimateRef, Stepper, ViewEstimate};
+use crate::scene::Scene;
+use estimates::Estimates;
+use folder::{Access, RunFolder};
+use fuse::FinishedViews;
+use manifest::Manifest;
+pub use needs::Needs;
+use needs::Shares;
+pub use run::Summary;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use task::{Content, Record};
+pub use task::{Task, ViewSummary};
+
+/// A run in a folder.
+///
+/// # Examples
+/// ```no_run
+/// use skep::job::Job;
+/// use skep::{Options, ignore_progress};
+///
+/// let job = Job::plan("SCENE".as_ref(), None, &Options::default(), "SCENE/dense".as_ref(), false)?;
+/// println!("{:.0} CPU seconds", job.needs().cpu_seconds);
+/// let summary = job.run(&ignore_progress)?;
+/// println!("{} points", summary.points);
+/// # Ok::<(), skep::Error>(())
+/// ```
+pub struct Job {
+    folder: RunFolder,
+    workspace: Workspace,
+    scene: Scene,
+    options: Options,
+    stepper: Stepper,
+    run: u64,
+    estimates: Estimates,
+    /// By view, the views that have it among their sources.
+    readers: Vec<Vec<u32>>,
+    needs: Needs,
+    shares: Shares,
+    notices: Vec<String>,
+    /// Locked until the job is dropped.
+    _lock: File,
+}
+
+impl Job {
+    /// Plans the run of a scene in a folder, which is created: reads model and photographs and puts them into
+    /// the folder. A run of the same photographs, model, options and version that began there goes on, unless
+    /// `fresh`; anything else begins anew, and [`Job::notices`] tells why. The options `threads` and `memory`
+    /// may change. No other process can work on the run while the job exists.
+    ///
+    /// # Errors
+    /// An option out of its range; less memory than the run needs; a file that is missing or damaged; a folder
+    /// that cannot be written, holds another scene, or in which another process works.
+    pub fn plan(
+        scene: &Path,
+        depth_range: Option<DepthRange>,
+        options: &Options,
+        folder: &Path,
+        fresh: bool,
+    ) -> Result<Job> {
+        options.check()?;
+        let source = SceneFolder::find(scene)?;
+        let folder = RunFolder::new(folder);
+        let lock = folder.lock(Access::Whole)?;
+        let pool = JoinedPool::new(options.threads)?;
+        let plan = pool.install(|| plan::read(&source, depth_range, options))?;
+        let run = plan.manifest.run();
+        let notices = plan::prepare(&folder, &source, &plan, fresh)?;
+        pool.install(|| Job::new(folder, plan.scene, options, run, notices, lock))
+    }
+
+    /// Opens a run that was planned, to do some of its tasks; other processes may do others at the same time.
+    /// Its options are those it was planned with, but for `threads`, `memory` and `simd`, which are those of
+    /// `others`.
+    ///
+    /// # Errors
+    /// A folder without a run of this version; a model that changed; less memory than the run needs; another
+    /// process that plans or does the whole run.
+    pub fn open(folder: &Path, others: &Options) -> Result<Job> {
+        let folder = RunFolder::new(folder);
+        let path = folder.manifest();
+        let Some(manifest) = Manifest::read(&path)? else {
+            return Err(Error::file(&path, "no such file; `skep plan SCENE -o DIR` plans a run in a folder"));
+        };
+        let options = manifest.options(others)?;
+        options.check()?;
+        let lock = folder.lock(Access::Tasks)?;
+        let scene = plan::read_planned(&folder, &manifest, &options)?;
+        let pool = JoinedPool::new(options.threads)?;
+        pool.install(|| Job::new(folder, scene, &options, manifest.run(), Vec::new(), lock))
+    }
+
+    fn new(
+        folder: RunFolder,
+        scene: Scene,
+        options: &Options,
+        run: u64,
+        notices: Vec<String>,
+        lock: File,
+    ) -> Result<Job> {
+        // The first stepper knows the source views, from which the limit of the images follows.
+        let planned = Stepper::with_image_limit(&scene, options, 0)?;
+        let mut readers = vec![Vec::new(); scene.views().len()];
+        for view in 0..scene.views().len() {
+            planned.sources(view).iter().for_each(|&source| readers[source as usize].push(view as u32));
+        }
+        let (needs, shares) = needs::needs(&scene, options, &planned, &readers)?;
+        let estimates = Estimates::new(&folder, run, shares.estimates);
+        Ok(Job {
+            workspace: Workspace::new(folder.root()),
+            folder,
+            options: options.clone(),
+            stepper: planned.limited_to(shares.images),
+            scene,
+            run,
+            estimates,
+            readers,
+            needs,
+            shares,
+            notices,
+            _lock: lock,
+        })
+    }
+
+    /// The scene; its photographs are decoded when they are loaded.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The options of the run.
+    pub fn options(&self) -> &Options {
+        &self.options
+    }
+
+    /// The cycles and source views of the run.
+    pub fn stepper(&self) -> &Stepper {
+        &self.stepper
+    }
+
+    /// The folder, with the results once they are written.
+    pub fn workspace(&self) -> &Workspace {
+        &self.workspace
+    }
+
+    /// The views whose files the tasks of a view read, ascending: its own, its sources, and those whose source
+    /// it is.
+    pub fn views_read_by(&self, view: usize) -> Vec<usize> {
+        let sources = self.stepper.sources(view).iter().chain(&self.readers[view]);
+        let mut read: Vec<usize> = sources.map(|&other| other as usize).chain([view]).collect();
+        read.sort_unstable();
+        read.dedup();
+        read
+    }
+
+    /// What the run needs.
+    pub fn needs(&self) -> Needs {
+        self.needs
+    }
+
+    /// What became of an earlier run in the folder, as sentences.
+    pub fn notices(&self) -> &[String] {
+        &self.notices
+    }
+
+    /// The checked estimate of a view, while the run is in the cycle or in the next one.
+    ///
+    /// # Errors
+    /// An estimate that is not there, not yet or not anymore; a damaged file.
+    pub fn checked(&self, cycle: usize, view: usize) -> Result<Arc<ViewEstimate<Checked>>> {
+        self.check_task(Task::Check { cycle, view })?;
+        self.estimates.checked(&self.stepper, cycle, view)
+    }
+
+    /// Whether a task is done, or needless because a scale ended early.
+    pub fn is_done(&self, task: Task) -> bool {
+        self.record(task).is_some() || self.is_needless(task)
+    }
+
+    /// Does a task, on the threads of the current rayon pool; nothing if it is done or needless. The tasks it
+    /// depends on must be done.
+    ///
+    /// # Errors
+    /// A view or cycle that does not exist; a task that it depends on and that is not done; a file that is
+    /// damaged or cannot be written; [`Error::Cancelled`].
+    pub fn run_task(&self, task: Task, progress: ProgressFn) -> Result<()> {
+        self.check_task(task)?;
+        if self.is_done(task) {
+            return Ok(());
+        }
+        let (content, files) = match task {
+            Task::Search { cycle, view } => self.search(cycle, view, progress)?,
+            Task::Check { cycle, view } => self.check(cycle, view)?,
+            Task::Next { cycle } => (Content::Next(self.decide_next(cycle)?), Vec::new()),
+            Task::Finish { view } => self.finish(view, progress)?,
+            Task::Fuse => self.fuse(progress)?,
+        };
+        let paths: Vec<&Path> = files.iter().map(|path| path.as_path()).collect();
+        Record::new(&self.folder, self.run, &paths, content)?.write(&self.folder.record(task))
+    }
+
+    fn record(&self, task: Task) -> Option<Record> {
+        Record::read(&self.folder, self.run, task)
+    }
+
+    fn check_task(&self, task: Task) -> Result<()> {
+        let (cycles, views) = (self.stepper.cycles().len(), self.stepper.views());
+        let (cycle, view) = match task {
+            Task::Search { cycle, view } | Task::Check { cycle, view } => (cycle, view),
+            Task::Next { cycle } => (cycle, 0),
+            Task::Finish { view } => (0, view),
+            Task::Fuse => (0, 0),
+        };
+        if cycle >= cycles {
+            return Err(Error::argument("cycle", cycle, format!("a cycle below their number, {cycles}")));
+        }
+        if view >= views {
+            return Err(Error::argument("view", view, format!("a view below their number, {views}")));
+        }
+        Ok(())
+    }
+
+    /// The cycles that run, as far as that is decided, and whether the last of them is the last of the run.
+    fn decided_cycles(&self) -> (Vec<usize>, bool) {
+        let mut decided = vec![0];
+        loop {
+            let last = decided[decided.len() - 1];
+            match self.record(Task::Next { cycle: last }).map(|record| record.content) {
+                Some(Content::Next(Some(next))) if next > last => decided.push(next),
+                Some(Content::Next(None)) => return (decided, true),
+                _ => return (decided, false),
+            }
+        }
+    }
+
+    /// Whether the task is of a cycle that does not run.
+    fn is_needless(&self, task: Task) -> bool {
+        let (Task::Search { cycle, .. } | Task::Check { cycle, .. } | Task::Next { cycle }) = task else {
+            return false;
+        };
+        let (decided, is_all) = self.decided_cycles();
+        !decided.contains(&cycle) && (is_all || decided.last().is_some_and(|&last| cycle < last))
+    }
+
+    /// The cycle before one that runs; `None` for the first.
+    fn cycle_before(&self, cycle: usize) -> Result<Option<usize>> {
+        let (decided, _) = self.decided_cycles();
+        match decided.iter().position(|&decided| decided == cycle) {
+            Some(0) => Ok(None),
+            Some(place) => Ok(Some(decided[place - 1])),
+            None => {
+                let last = decided[decided.len() - 1];
+                let value = format!("{cycle}, before the tasks of cycle {last} are done");
+                Err(Error::argument("cycle", value, format!("cycle {last}: search, check and next")))
+            }
+        }
+    }
+
+    fn search(&self, cycle: usize, view: usize, progress: ProgressFn) -> Result<(Content, Vec<PathBuf>)> {
+        let before = self.cycle_before(cycle)?;
+        self.estimates.remove_before(cycle, before);
+        let read = self.views_read_by(view);
+        let load = |&other: &usize| match before {
+            Some(before) => self
+                .estimates
+                .checked_for(&self.stepper, (before, other), cycle)
+                .map(|found| Some((other, found))),
+            None => Ok(None),
+        };
+        let loaded: Vec<_> = read.iter().map(load).collect::<Result<_>>()?;
+        let mut estimates = vec![None; self.stepper.views()];
+        for (other, found) in loaded.iter().flatten() {
+            estimates[*other] = Some(&**found);
+        }
+        let candidates = self.stepper.propagate(cycle, view, &estimates)?;
+        let found = self.stepper.search(cycle, view, &estimates, Some(&candidates), progress)?;
+        Ok((Content::Search, vec![self.estimates.put_searched(found)?]))
+    }
+
+    fn check(&self, cycle: usize, view: usize) -> Result<(Content, Vec<PathBuf>)> {
+        self.cycle_before(cycle)?;
+        let load = |&source: &u32| {
+            self.estimates
+                .searched(&self.stepper, cycle, source as usize)
+                .map(|found| (source as usize, found))
+        };
+        let loaded: Vec<_> = self.stepper.sources(view).iter().map(load).collect::<Result<_>>()?;
+        let mut sources = vec![None; self.stepper.views()];
+        for (source, found) in &loaded {
+            sources[*source] = Some(EstimateRef::Searched(found));
+        }
+        let own = self.estimates.searched(&self.stepper, cycle, view)?;
+        let checked = self.stepper.check(&own, &sources)?;
+        let record = checked.cycles().last().copied();
+        let record =
+            record.ok_or_else(|| Error::argument("estimate", "one without a cycle", "a searched one"))?;
+        Ok((Content::Check(record), vec![self.estimates.put_checked(checked)?]))
+    }
+
+    fn decide_next(&self, cycle: usize) -> Result<Option<usize>> {
+        self.cycle_before(cycle)?;
+        let record = |view: usize| match self.record(Task::Check { cycle, view }).map(|record| record.content)
+        {
+            Some(Content::Check(record)) => Ok(record),
+            _ => Err(Error::argument(
+                "cycle",
+                format!("{cycle}, before the check of view {view} is done"),
+                "a cycle whose views are all checked",
+            )),
+        };
+        let records: Vec<CycleRecord> = (0..self.stepper.views()).map(record).collect::<Result<_>>()?;
+        self.stepper.next_after(cycle, &records)
+    }
+
+    fn finish(&self, view: usize, progress: ProgressFn) -> Result<(Content, Vec<PathBuf>)> {
+        let (decided, true) = self.decided_cycles() else {
+            return Err(Error::argument(
+                "finish",
+                "before the last cycle is done",
+                "a run whose cycles are done",
+            ));
+        };
+        let last = decided[decided.len() - 1];
+        let read =
+            std::iter::once(view).chain(self.stepper.sources(view).iter().map(|&source| source as usize));
+        let load =
+            |other: usize| self.estimates.checked(&self.stepper, last, other).map(|found| (other, found));
+        let loaded: Vec<_> = read.map(load).collect::<Result<_>>()?;
+        let mut estimates = vec![None; self.stepper.views()];
+        for (other, found) in &loaded {
+            estimates[*other] = Some(&**found);
+        }
+        let result = self.stepper.finish(view, &estimates, progress)?;
+        let own = &self.scene.views()[view];
+        self.workspace.write_view(&own.name, &own.camera, &result)?;
+        let summary = ViewSummary {
+            status_counts: result.status_counts(),
+            counts: result.counts,
+            cycles: result.cycles,
+        };
+        Ok((Content::Finish(summary), self.workspace.view_files(&own.name)))
+    }
+
+    fn fuse(&self, progress: ProgressFn) -> Result<(Content, Vec<PathBuf>)> {
+        for view in 0..self.stepper.views() {
+            if !self.is_done(Task::Finish { view }) {
+                let value = format!("before view {view} is finished");
+                return Err(Error::argument("fuse", value, "a run whose views are all finished"));
+            }
+        }
+        let overlaps = overlaps(self.scene.views().len(), self.scene.points());
+        let limit = self.shares.images + self.shares.estimates;
+        let views = FinishedViews::new(&self.scene, &self.workspace, overlaps, limit);
+        let path = self.workspace.cloud();
+        let mut cloud = CloudWriter::new(&path)?;
+        fuse_input(&views, &self.options.fusion, progress, &mut |points| cloud.add(points))?;
+        let points = cloud.finish()?;
+        let visibility = visibility_path(&path);
+        Ok((Content::Fuse(points), vec![path, visibility]))
+    }
+}
+
+/// What of the maps in a folder does not belong to a scene: nothing if no run made them. For a run, files that
+/// are not what it wrote, as sentences.
+///
+/// # Errors
+/// A run that was made from another model.
+pub fn check_maps(folder: &Path, scene: &SceneFolder) -> Result<Vec<String>> {
+    let folder = RunFolder::new(folder);
+    let Some(manifest) = Manifest::read(&folder.manifest())? else { return Ok(Vec::new()) };
+    let model = ColmapModel::read(&scene.sparse)?;
+    if !manifest.is_of_model(&model) {
+        let problem =
+            format!("the maps in {} were made with other cameras, poses or points", folder.root().display());
+        return Err(Error::file(&scene.sparse, problem));
+    }
+    let run = manifest.run();
+    let damaged = |(view, image): (usize, &crate::io::ModelImage)| {
+        let Some(record) = Record::read(&folder, run, Task::Finish { view }) else {
+            return Some(format!("{} is not finished: its maps may be of another run", image.name));
+        };
+        record.verify(&folder).err().map(|error| error.to_string())
+    };
+    Ok(model.images.iter().enumerate().filter_map(damaged).collect())
+}

@@ -1,0 +1,223 @@
+//! The beginning of a run: the scene is read and compared with what the folder holds.
+
+use super::fingerprint::fingerprint;
+use super::folder::RunFolder;
+use super::manifest::{Manifest, PhotographEntry};
+use super::photograph::FilePhotograph;
+use super::task::Record;
+use crate::error::{Error, Result};
+use crate::geometry::DepthRange;
+use crate::image::Photograph;
+use crate::io::{
+    ColmapModel, ModelImage, SceneFolder, Workspace, cannot_be_read, link_or_copy, picture_from_bytes,
+};
+use crate::options::Options;
+use crate::scene::{Scene, View};
+use rayon::prelude::*;
+use std::path::Path;
+use std::sync::Arc;
+
+/// A scene in files and what it is made from.
+pub(super) struct Plan {
+    pub scene: Scene,
+    pub manifest: Manifest,
+}
+
+/// Reads a scene and decodes each photograph once: a damaged one is found now and not after hours.
+///
+/// # Errors
+/// A file that is missing, damaged, or not of its camera's size.
+pub(super) fn read(folder: &SceneFolder, depth_range: Option<DepthRange>, options: &Options) -> Result<Plan> {
+    if !folder.images.is_dir() {
+        return Err(Error::file(&folder.images, "no such folder; expected the photographs in it"));
+    }
+    let model = ColmapModel::read(&folder.sparse)?;
+    let entry = |image: &ModelImage| {
+        // Checks that it exists and its size.
+        let path = folder.photograph(&image.name, &image.camera)?;
+        let bytes = std::fs::read(&path).map_err(|error| cannot_be_read(&path, error))?;
+        picture_from_bytes(&bytes, &path)?;
+        Ok(PhotographEntry { name: image.name.clone(), content: fingerprint(&bytes) })
+    };
+    let photographs: Vec<_> = model.images.par_iter().with_max_len(1).map(entry).collect::<Result<_>>()?;
+    let manifest = Manifest::new(&model, photographs, depth_range, options);
+    let scene = scene(folder, model, &manifest)?;
+    Ok(Plan { scene, manifest })
+}
+
+/// The scene of a run that was planned before, in the run's own folder.
+///
+/// # Errors
+/// A model that is missing or not that of the run.
+pub(super) fn read_planned(folder: &RunFolder, manifest: &Manifest, options: &Options) -> Result<Scene> {
+    let own = SceneFolder::find(folder.root())?;
+    let model = ColmapModel::read(&own.sparse)?;
+    let found = Manifest::new(&model, manifest.photographs.clone(), manifest.depth_range(), options);
+    let differences = found.differences(manifest);
+    if differences.is_empty() {
+        return scene(&own, model, manifest);
+    }
+    let problem = format!("not what the run was planned with: {}; plan it again", differences.join(", "));
+    Err(Error::file(folder.manifest(), problem))
+}
+
+fn scene(folder: &SceneFolder, model: ColmapModel, manifest: &Manifest) -> Result<Scene> {
+    let view = |(image, entry): (ModelImage, &PhotographEntry)| {
+        let photograph = FilePhotograph {
+            path: folder.images.join(&image.name),
+            size: (image.camera.width, image.camera.height),
+            fingerprint: entry.content.clone(),
+        };
+        View {
+            name: image.name,
+            picture: Photograph::Deferred(Arc::new(photograph)),
+            camera: image.camera,
+            mask: None,
+            depth_range: manifest.depth_range(),
+            sources: None,
+        }
+    };
+    Scene::new(model.images.into_iter().zip(&manifest.photographs).map(view).collect(), model.points)
+}
+
+/// Prepares the folder for a run: one that it began before goes on, anything else begins anew. Returns what
+/// was done in words, if it is worth a notice.
+///
+/// # Errors
+/// Files that cannot be replaced.
+pub(super) fn prepare(
+    folder: &RunFolder,
+    scene: &SceneFolder,
+    plan: &Plan,
+    fresh: bool,
+) -> Result<Vec<String>> {
+    let mut notices = Vec::new();
+    let is_own = folder.manifest().is_file() || folder.report().is_file();
+    if !is_own {
+        refuse_other_scene(folder, scene)?;
+    }
+    let earlier = match Manifest::read(&folder.manifest()) {
+        Ok(earlier) => earlier,
+        Err(error) => {
+            notices.push(format!("{error}; the run begins anew"));
+            None
+        }
+    };
+    let goes_on = !fresh && earlier.as_ref() == Some(&plan.manifest);
+    if !goes_on {
+        if let Some(earlier) = earlier.filter(|_| !fresh) {
+            let differences = plan.manifest.differences(&earlier);
+            notices.push(format!(
+                "the run in {} was made from something else and begins anew; changed: {}",
+                folder.root().display(),
+                listed(&differences)
+            ));
+        }
+        remove_run(folder)?;
+    }
+    adopt(folder, scene, plan)?;
+    let workspace = Workspace::new(folder.root());
+    workspace.write_lists(plan.scene.views().iter().map(|view| view.name.as_str()))?;
+    if !goes_on {
+        plan.manifest.write(&folder.manifest())?;
+    }
+    Ok(notices)
+}
+
+/// The first entries of a list, and the number of the others.
+fn listed(entries: &[String]) -> String {
+    const MOST: usize = 5;
+    let first = entries.iter().take(MOST).cloned().collect::<Vec<_>>().join(", ");
+    match entries.len().checked_sub(MOST) {
+        Some(more) if more > 0 => format!("{first} and {more} more"),
+        _ => first,
+    }
+}
+
+/// Removes the records of a run and the files they list.
+pub(super) fn remove_run(folder: &RunFolder) -> Result<()> {
+    // A report and a cloud say that what is beside them is complete.
+    for path in [folder.report(), folder.manifest()] {
+        remove(&path)?;
+    }
+    for entry in std::fs::read_dir(folder.tasks()).into_iter().flatten().flatten() {
+        if let Ok(record) = std::fs::read(entry.path())
+            && let Ok(record) = serde_json::from_slice::<Record>(&record)
+        {
+            record.remove_files(folder);
+        }
+    }
+    for path in [folder.tasks(), folder.estimates()] {
+        match std::fs::remove_dir_all(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                return Err(Error::file(path, format!("cannot be removed: {error}")));
+            }
+            _ => (),
+        }
+    }
+    Ok(())
+}
+
+/// A folder with a model that no run put there may be a scene of the user.
+fn refuse_other_scene(folder: &RunFolder, scene: &SceneFolder) -> Result<()> {
+    match SceneFolder::find(folder.root()) {
+        Ok(found) if !is_same(&found.sparse, &scene.sparse) => {
+            let (own, given) = (ColmapModel::read(&found.sparse), ColmapModel::read(&scene.sparse)?);
+            if own.is_ok_and(|own| own == given) {
+                return Ok(());
+            }
+            let problem = "holds another scene, which no run of skep put there; name another folder";
+            Err(Error::file(folder.root(), problem))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn remove(path: &Path) -> Result<()> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(Error::file(path, format!("cannot be replaced: {error}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Puts the scene into the run's folder: photographs as hard links where the file system can, and the model.
+/// What differs from the scene is replaced.
+fn adopt(folder: &RunFolder, scene: &SceneFolder, plan: &Plan) -> Result<()> {
+    let images = folder.root().join("images");
+    if !is_same(&images, &scene.images) {
+        for entry in &plan.manifest.photographs {
+            let (from, to) = (scene.images.join(&entry.name), images.join(&entry.name));
+            let is_there = std::fs::read(&to).is_ok_and(|bytes| fingerprint(&bytes) == entry.content);
+            if !is_there {
+                remove(&to)?;
+                link_or_copy(&from, &to)?;
+            }
+        }
+    }
+    let sparse = folder.root().join("sparse");
+    if is_same(&sparse, &scene.sparse) || is_same(&sparse.join("0"), &scene.sparse) {
+        return Ok(());
+    }
+    // A model is a set of files: those of another one must not stay beside it.
+    for stem in ["cameras", "images", "points3D"] {
+        for name in ["bin", "txt"].map(|extension| format!("{stem}.{extension}")) {
+            let (from, to) = (scene.sparse.join(&name), sparse.join(&name));
+            match std::fs::read(&from) {
+                Ok(bytes) => {
+                    if std::fs::read(&to).ok().as_ref() != Some(&bytes) {
+                        crate::io::write_file(&to, |out| std::io::Write::write_all(out, &bytes))?;
+                    }
+                }
+                Err(_) => remove(&to)?,
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether two paths are the same folder.
+fn is_same(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}

@@ -1,0 +1,184 @@
+//! All tasks of a run, in one process.
+
+use super::meter::Meter;
+use super::task::{Content, Record};
+use super::{Job, Task, ViewSummary, plan};
+use crate::error::{Error, Result};
+use crate::parallel::{JoinedPool, ProgressFn};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// What a run made.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Summary {
+    /// By view.
+    pub views: Vec<ViewSummary>,
+    /// Number of points.
+    pub points: usize,
+    /// What was damaged and made again, and warnings about the source views, as sentences.
+    pub warnings: Vec<String>,
+}
+
+/// Units of work of a check and of the end of a view, for each pixel; those of a search are in
+/// [`Cycle::work`](crate::Cycle::work).
+const CHECK_UNITS: u64 = 1;
+/// Units of work of the fusion, for each pixel.
+const FUSE_UNITS: u64 = 1;
+
+impl Job {
+    /// Does all tasks that are not done, on a thread pool of its own, and returns what the run made. Files
+    /// that were damaged since they were written are made again.
+    ///
+    /// # Errors
+    /// The errors of [`Job::run_task`]. What is done stays done: the same call goes on there.
+    pub fn run(&self, progress: ProgressFn) -> Result<Summary> {
+        self.run_observed(progress, &|_| Ok(()))
+    }
+
+    /// Like [`Job::run`], and calls `after_cycle` with each cycle that was run, when its views are checked:
+    /// [`Job::checked`] gives their estimates.
+    ///
+    /// # Errors
+    /// The errors of [`Job::run`]; what `after_cycle` returns.
+    pub fn run_observed(
+        &self,
+        progress: ProgressFn,
+        after_cycle: &(dyn Fn(usize) -> Result<()> + Sync),
+    ) -> Result<Summary> {
+        let mut warnings = self.stepper.warnings().to_vec();
+        JoinedPool::new(self.options.threads)?.install(|| {
+            warnings.extend(self.repair()?);
+            self.run_all(progress, after_cycle)
+        })?;
+        let summary = |view| match self.record(Task::Finish { view }).map(|record| record.content) {
+            Some(Content::Finish(summary)) => Ok(summary),
+            _ => Err(Error::file(self.folder.record(Task::Finish { view }), "removed during the run")),
+        };
+        let views = (0..self.stepper.views()).map(summary).collect::<Result<_>>()?;
+        let points = match self.record(Task::Fuse).map(|record| record.content) {
+            Some(Content::Fuse(points)) => points,
+            _ => return Err(Error::file(self.folder.record(Task::Fuse), "removed during the run")),
+        };
+        Ok(Summary { views, points, warnings })
+    }
+
+    /// Does some tasks that do not depend on each other, a few at a time, on a thread pool of its own.
+    ///
+    /// # Errors
+    /// The errors of [`Job::run_task`]. What is done stays done.
+    pub fn run_tasks(&self, tasks: &[Task], progress: ProgressFn) -> Result<()> {
+        let meter = Meter::new(progress, tasks.len() as u64);
+        JoinedPool::new(self.options.threads)?
+            .install(|| self.run_counted(tasks.iter().map(|&task| (task, 1)).collect(), &meter))
+    }
+
+    fn run_all(
+        &self,
+        progress: ProgressFn,
+        after_cycle: &(dyn Fn(usize) -> Result<()> + Sync),
+    ) -> Result<()> {
+        let pixels: u64 = self.scene.views().iter().map(|view| view.camera.pixels() as u64).sum();
+        let cycles = self.stepper.cycles();
+        let checks = |before: usize| -> u64 {
+            let checked = |cycle: &crate::pipeline::Cycle| {
+                CHECK_UNITS * pixels / u64::from(cycle.scale.downscale).pow(2)
+            };
+            cycles[..before].iter().map(checked).sum()
+        };
+        let work_before = |cycle: usize| self.stepper.work_before(cycle) + checks(cycle);
+        let total = work_before(cycles.len()) + (CHECK_UNITS + FUSE_UNITS) * pixels;
+        let meter = Meter::new(progress, total);
+        let mut next = Some(0);
+        while let Some(cycle) = next {
+            let pixels_of = |view: usize| {
+                let (width, height) = self.stepper.size(cycle, view).unwrap_or_default();
+                u64::from(width) * u64::from(height)
+            };
+            let search = |view| (Task::Search { cycle, view }, cycles[cycle].work(pixels_of(view)));
+            self.run_counted((0..self.stepper.views()).map(search).collect(), &meter)?;
+            let check = |view| (Task::Check { cycle, view }, CHECK_UNITS * pixels_of(view));
+            self.run_counted((0..self.stepper.views()).map(check).collect(), &meter)?;
+            if !self.is_done(Task::Next { cycle }) {
+                after_cycle(cycle)?;
+                self.run_task(Task::Next { cycle }, progress)?;
+            }
+            next = match self.record(Task::Next { cycle }).map(|record| record.content) {
+                Some(Content::Next(next)) => next,
+                _ => None,
+            };
+            let following = next.unwrap_or(cycles.len());
+            meter.skip(work_before(following) - work_before(cycle + 1));
+        }
+        let of_view = |view: usize| self.scene.views()[view].camera.pixels() as u64;
+        let finish = |view| (Task::Finish { view }, CHECK_UNITS * of_view(view));
+        self.run_counted((0..self.stepper.views()).map(finish).collect(), &meter)?;
+        self.run_counted(vec![(Task::Fuse, FUSE_UNITS * pixels)], &meter)?;
+        self.estimates.remove_all();
+        Ok(())
+    }
+
+    /// Does some tasks that do not depend on each other, a few at a time, with their units of work.
+    fn run_counted(&self, tasks: Vec<(Task, u64)>, meter: &Meter) -> Result<()> {
+        let next = AtomicUsize::new(0);
+        let run = |_| -> Result<()> {
+            while let Some(&(task, units)) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {
+                if self.is_done(task) {
+                    meter.skip(units);
+                } else {
+                    self.run_task(task, &meter.task(units))?;
+                }
+            }
+            Ok(())
+        };
+        let lanes = self.shares.tasks.min(tasks.len());
+        (0..lanes).into_par_iter().with_max_len(1).try_for_each(run)
+    }
+
+    /// Compares the files of tasks that are done with their records. What is damaged is made again: the task
+    /// alone where its inputs are still there, else the run begins anew. Returns what was damaged.
+    fn repair(&self) -> Result<Vec<String>> {
+        let mut warnings = Vec::new();
+        let (decided, is_all) = self.decided_cycles();
+        let last = decided[decided.len() - 1];
+        let views = || 0..self.stepper.views();
+        // A complete run keeps no estimates: only the maps and the cloud are there.
+        let is_complete = self.record(Task::Fuse).is_some();
+        let before = self.cycle_before(last)?;
+        let mut inputs: Vec<Task> = Vec::new();
+        let mut current: Vec<Task> = views().map(|view| Task::Finish { view }).collect();
+        current.push(Task::Fuse);
+        if is_all && !is_complete {
+            inputs.extend(views().map(|view| Task::Check { cycle: last, view }));
+        } else if !is_complete {
+            inputs.extend(
+                before.into_iter().flat_map(|cycle| views().map(move |view| Task::Check { cycle, view })),
+            );
+            current.extend(views().map(|view| Task::Search { cycle: last, view }));
+            current.extend(views().map(|view| Task::Check { cycle: last, view }));
+        }
+        let damaged = |task: &Task| -> Option<(Task, Error)> {
+            let record: Option<Record> = self.record(*task);
+            record.and_then(|record| record.verify(&self.folder).err()).map(|error| (*task, error))
+        };
+        let mut begin_anew = false;
+        let broken: Vec<_> = current.par_iter().filter_map(damaged).collect();
+        for (task, error) in broken {
+            // Without estimates a damaged map cannot be made from what is there.
+            begin_anew |= is_complete && matches!(task, Task::Finish { .. });
+            warnings.push(format!("{error}; it is made again"));
+            let _ = std::fs::remove_file(self.folder.record(task));
+        }
+        let broken: Vec<_> = inputs.par_iter().filter_map(damaged).collect();
+        begin_anew |= !broken.is_empty();
+        warnings.extend(broken.iter().map(|(_, error)| format!("{error}; the run begins anew")));
+        if begin_anew {
+            let manifest = std::fs::read(self.folder.manifest());
+            plan::remove_run(&self.folder)?;
+            let path = self.folder.manifest();
+            let manifest = manifest.map_err(|error| crate::io::cannot_be_read(&path, error))?;
+            crate::io::write_file(&path, |out| std::io::Write::write_all(out, &manifest))?;
+            self.estimates.remove_all();
+        }
+        Ok(warnings)
+    }
+}

@@ -1,0 +1,160 @@
+//! The tasks of a run, and the records that they are done.
+
+use super::fingerprint::{Fingerprint, fingerprint_file, text};
+use super::folder::RunFolder;
+use crate::ambc::Counts;
+use crate::error::{Error, Result};
+use crate::io::write_file;
+use crate::pipeline::CycleRecord;
+use crate::scene::PixelStatus;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// A part of a run. What a task reads is on disk once the tasks it depends on are done.
+///
+/// | task | reads | writes |
+/// |---|---|---|
+/// | `Search` | checked estimates of the cycle before: of the view, its sources, and the views whose source it is | the view's searched estimate |
+/// | `Check` | searched estimates of the cycle: of the view and its sources | the view's checked estimate |
+/// | `Next` | how many pixels changed in each view's search | which cycle follows |
+/// | `Finish` | checked estimates of the last cycle: of the view and its sources | the view's maps |
+/// | `Fuse` | the maps of all views | the cloud |
+///
+/// All of them read photographs and the model. Two tasks of the same kind and cycle never depend on each
+/// other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Task {
+    /// Searches the planes of a view.
+    Search {
+        /// The cycle, as in [`Stepper::cycles`](crate::Stepper::cycles).
+        cycle: usize,
+        /// The view.
+        view: usize,
+    },
+    /// Checks the planes of a view against its sources.
+    Check {
+        /// The cycle.
+        cycle: usize,
+        /// The view.
+        view: usize,
+    },
+    /// Decides which cycle follows: a scale ends early once few pixels change.
+    Next {
+        /// The cycle.
+        cycle: usize,
+    },
+    /// Writes the maps of a view.
+    Finish {
+        /// The view.
+        view: usize,
+    },
+    /// Fuses the maps of all views.
+    Fuse,
+}
+
+impl Task {
+    /// The name of the task's record.
+    pub(super) fn file_name(self) -> String {
+        match self {
+            Task::Search { cycle, view } => format!("cycle{cycle:02}-search-{view:05}.json"),
+            Task::Check { cycle, view } => format!("cycle{cycle:02}-check-{view:05}.json"),
+            Task::Next { cycle } => format!("cycle{cycle:02}-next.json"),
+            Task::Finish { view } => format!("finish-{view:05}.json"),
+            Task::Fuse => "fuse.json".to_owned(),
+        }
+    }
+}
+
+/// That a task is done: its files, and what other tasks and the report read of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Record {
+    /// The run it belongs to.
+    run: String,
+    files: Vec<FileEntry>,
+    pub content: Content,
+}
+
+/// A file of the run's folder, its path relative to it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct FileEntry {
+    path: String,
+    content: Fingerprint,
+}
+
+/// What a task found, besides its files.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) enum Content {
+    Search,
+    /// The last record of the view.
+    Check(CycleRecord),
+    /// The cycle that follows, if any.
+    Next(Option<usize>),
+    Finish(ViewSummary),
+    /// Number of points.
+    Fuse(usize),
+}
+
+/// The counts of a finished view.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ViewSummary {
+    /// Number of pixels of each status, in the order of [`PixelStatus::ALL`].
+    pub status_counts: [u64; PixelStatus::ALL.len()],
+    /// Work done for the view.
+    pub counts: Counts,
+    /// The cycles in order.
+    pub cycles: Vec<CycleRecord>,
+}
+
+impl Record {
+    /// The record of a task that wrote these files.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub(super) fn new(folder: &RunFolder, run: u64, files: &[&Path], content: Content) -> Result<Record> {
+        let entry = |path: &&Path| {
+            let relative = path.strip_prefix(folder.root()).unwrap_or(path);
+            let path_text = relative.to_str().ok_or_else(|| Error::file(path, "not a name in UTF-8"))?;
+            Ok(FileEntry { path: path_text.to_owned(), content: fingerprint_file(path)? })
+        };
+        let files = files.iter().map(entry).collect::<Result<_>>()?;
+        Ok(Record { run: text(run), files, content })
+    }
+
+    /// Reads the record of a task; `None` where there is none of this run.
+    pub(super) fn read(folder: &RunFolder, run: u64, task: Task) -> Option<Record> {
+        let bytes = std::fs::read(folder.record(task)).ok()?;
+        let record: Record = serde_json::from_slice(&bytes).ok()?;
+        (record.run == text(run)).then_some(record)
+    }
+
+    pub(super) fn write(&self, path: &Path) -> Result<()> {
+        write_file(path, |out| Ok(serde_json::to_writer(out, self)?))
+    }
+
+    /// What is wrong with the files of the task; reads all of them.
+    ///
+    /// # Errors
+    /// A file that is missing, truncated or otherwise changed, named.
+    pub(super) fn verify(&self, folder: &RunFolder) -> Result<()> {
+        self.files.iter().try_for_each(|file| {
+            let path = folder.root().join(&file.path);
+            let found = fingerprint_file(&path)?;
+            if found == file.content {
+                return Ok(());
+            }
+            let problem = match found.bytes == file.content.bytes {
+                true => "damaged: its content is not what the run wrote".to_owned(),
+                false => format!("{} bytes; the run wrote {}", found.bytes, file.content.bytes),
+            };
+            Err(Error::file(path, problem))
+        })
+    }
+
+    /// Removes the files of the task.
+    pub(super) fn remove_files(&self, folder: &RunFolder) {
+        for file in &self.files {
+            // What cannot be removed is replaced later.
+            let _ = std::fs::remove_file(folder.root().join(&file.path));
+        }
+    }
+}
