@@ -26,15 +26,63 @@ impl<'a> Meter<'a> {
         self.done.fetch_add((units as f64 * STEPS) as u64, Ordering::Relaxed);
     }
 
-    /// A progress function for a task of this work, whose own `done` goes from 0 to 1.
-    pub(super) fn task(&self, units: u64) -> impl Fn(&Progress) -> ControlFlow<()> + Sync {
-        let counted = AtomicU64::new(0);
-        move |at: &Progress| {
-            let own = (at.done.clamp(0.0, 1.0) * units as f64 * STEPS) as u64;
-            let before = counted.fetch_max(own, Ordering::Relaxed);
-            let done = self.done.fetch_add(own.saturating_sub(before), Ordering::Relaxed);
-            let done = done as f64 / STEPS / self.total;
-            (self.progress)(&Progress { done: done.min(1.0), ..*at })
+    /// A task of this work.
+    pub(super) fn task(&self, units: u64) -> TaskMeter<'_> {
+        TaskMeter { meter: self, units: units as f64, counted: AtomicU64::new(0) }
+    }
+}
+
+/// Counts the work of one task.
+pub(super) struct TaskMeter<'a> {
+    meter: &'a Meter<'a>,
+    units: f64,
+    /// What of it is counted, times `STEPS`.
+    counted: AtomicU64,
+}
+
+impl TaskMeter<'_> {
+    /// Reports the progress of the task, whose own `done` goes from 0 to 1.
+    pub(super) fn report(&self, at: &Progress) -> ControlFlow<()> {
+        let done = self.count(at.done) as f64 / STEPS / self.meter.total;
+        (self.meter.progress)(&Progress { done: done.min(1.0), ..*at })
+    }
+
+    /// Counts the whole task.
+    pub(super) fn complete(&self) {
+        self.count(1.0);
+    }
+
+    /// Counts the task up to a fraction; returns all work that is counted.
+    fn count(&self, fraction: f64) -> u64 {
+        let own = (fraction.clamp(0.0, 1.0) * self.units * STEPS) as u64;
+        let added = own.saturating_sub(self.counted.fetch_max(own, Ordering::Relaxed));
+        self.meter.done.fetch_add(added, Ordering::Relaxed) + added
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parallel::Phase;
+    use std::sync::Mutex;
+
+    #[test]
+    fn tasks_at_the_same_time_add_up_and_never_count_twice() {
+        let reported = Mutex::new(Vec::new());
+        let progress = |at: &Progress| {
+            reported.lock().unwrap().push(at.done);
+            ControlFlow::Continue(())
+        };
+        let at = |done| Progress { phase: Phase::Search, downscale: 1, cycle: 0, view: 0, views: 2, done };
+        let meter = Meter::new(&progress, 8);
+        meter.skip(2);
+        let (first, second) = (meter.task(4), meter.task(2));
+        for (task, done) in [(&first, 0.5), (&second, 0.5), (&first, 0.25), (&first, 1.0)] {
+            assert!(task.report(&at(done)).is_continue());
         }
+        second.complete();
+        first.complete();
+        assert!(second.report(&at(1.0)).is_continue());
+        assert_eq!(*reported.lock().unwrap(), [0.5, 0.625, 0.625, 0.875, 1.0]);
     }
 }

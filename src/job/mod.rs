@@ -25,7 +25,7 @@ use crate::fusion::{fuse_input, overlaps};
 use crate::geometry::DepthRange;
 use crate::io::{CloudWriter, ColmapModel, SceneFolder, Workspace, visibility_path};
 use crate::options::Options;
-use crate::parallel::{JoinedPool, ProgressFn};
+use crate::parallel::{JoinedPool, Phase, Progress, ProgressFn};
 use crate::pipeline::{Checked, CycleRecord, EstimateRef, Stepper, ViewEstimate};
 use crate::scene::Scene;
 use estimates::Estimates;
@@ -200,6 +200,11 @@ impl Job {
         self.estimates.checked(&self.stepper, cycle, view)
     }
 
+    /// Whether all tasks are done.
+    pub fn is_complete(&self) -> bool {
+        self.is_done(Task::Fuse)
+    }
+
     /// Whether a task is done, or needless because a scale ended early.
     pub fn is_done(&self, task: Task) -> bool {
         self.record(task).is_some() || self.is_needless(task)
@@ -218,7 +223,7 @@ impl Job {
         }
         let (content, files) = match task {
             Task::Search { cycle, view } => self.search(cycle, view, progress)?,
-            Task::Check { cycle, view } => self.check(cycle, view)?,
+            Task::Check { cycle, view } => self.check(cycle, view, progress)?,
             Task::Next { cycle } => (Content::Next(self.decide_next(cycle)?), Vec::new()),
             Task::Finish { view } => self.finish(view, progress)?,
             Task::Fuse => self.fuse(progress)?,
@@ -305,8 +310,13 @@ impl Job {
         Ok((Content::Search, vec![self.estimates.put_searched(found)?]))
     }
 
-    fn check(&self, cycle: usize, view: usize) -> Result<(Content, Vec<PathBuf>)> {
+    fn check(&self, cycle: usize, view: usize, progress: ProgressFn) -> Result<(Content, Vec<PathBuf>)> {
         self.cycle_before(cycle)?;
+        let (at, views) = (self.stepper.cycles()[cycle], self.stepper.views());
+        let (phase, downscale) = (Phase::Check, at.scale.downscale);
+        if progress(&Progress { phase, downscale, cycle: at.cycle, view, views, done: 0.0 }).is_break() {
+            return Err(Error::Cancelled);
+        }
         let load = |&source: &u32| {
             self.estimates
                 .searched(&self.stepper, cycle, source as usize)

@@ -24,7 +24,7 @@ const DECODE_BYTES: u64 = 12;
 const MAP_BYTES: u64 = 60;
 const ESTIMATE_BYTES: u64 = 52;
 /// CPU seconds for each unit of work and source view; measured on one core of a server with AVX2.
-const SECONDS_PER_UNIT: f64 = 1.0e-7;
+const SECONDS_PER_UNIT: f64 = 1.9e-7;
 
 /// What a run needs, estimated before it starts.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -19,11 +19,12 @@ pub struct Summary {
     pub warnings: Vec<String>,
 }
 
-/// Units of work of a check and of the end of a view, for each pixel; those of a search are in
-/// [`Cycle::work`](crate::Cycle::work).
-const CHECK_UNITS: u64 = 1;
-/// Units of work of the fusion, for each pixel.
-const FUSE_UNITS: u64 = 1;
+/// Units of work, for each pixel, of a check, the end of a view, and the fusion, if a unit of the search (see
+/// [`Cycle::work`](crate::Cycle::work)) is [`SEARCH_UNITS`]; by their CPU time on photographs.
+const SEARCH_UNITS: u64 = 10;
+const CHECK_UNITS: u64 = 7;
+const FINISH_UNITS: u64 = 10;
+const FUSE_UNITS: u64 = 5;
 
 impl Job {
     /// Does all tasks that are not done, on a thread pool of its own, and returns what the run made. Files
@@ -85,8 +86,8 @@ impl Job {
             };
             cycles[..before].iter().map(checked).sum()
         };
-        let work_before = |cycle: usize| self.stepper.work_before(cycle) + checks(cycle);
-        let total = work_before(cycles.len()) + (CHECK_UNITS + FUSE_UNITS) * pixels;
+        let work_before = |cycle: usize| SEARCH_UNITS * self.stepper.work_before(cycle) + checks(cycle);
+        let total = work_before(cycles.len()) + (FINISH_UNITS + FUSE_UNITS) * pixels;
         let meter = Meter::new(progress, total);
         let mut next = Some(0);
         while let Some(cycle) = next {
@@ -94,7 +95,8 @@ impl Job {
                 let (width, height) = self.stepper.size(cycle, view).unwrap_or_default();
                 u64::from(width) * u64::from(height)
             };
-            let search = |view| (Task::Search { cycle, view }, cycles[cycle].work(pixels_of(view)));
+            let search =
+                |view| (Task::Search { cycle, view }, SEARCH_UNITS * cycles[cycle].work(pixels_of(view)));
             self.run_counted((0..self.stepper.views()).map(search).collect(), &meter)?;
             let check = |view| (Task::Check { cycle, view }, CHECK_UNITS * pixels_of(view));
             self.run_counted((0..self.stepper.views()).map(check).collect(), &meter)?;
@@ -110,7 +112,7 @@ impl Job {
             meter.skip(work_before(following) - work_before(cycle + 1));
         }
         let of_view = |view: usize| self.scene.views()[view].camera.pixels() as u64;
-        let finish = |view| (Task::Finish { view }, CHECK_UNITS * of_view(view));
+        let finish = |view| (Task::Finish { view }, FINISH_UNITS * of_view(view));
         self.run_counted((0..self.stepper.views()).map(finish).collect(), &meter)?;
         self.run_counted(vec![(Task::Fuse, FUSE_UNITS * pixels)], &meter)?;
         self.estimates.remove_all();
@@ -125,7 +127,9 @@ impl Job {
                 if self.is_done(task) {
                     meter.skip(units);
                 } else {
-                    self.run_task(task, &meter.task(units))?;
+                    let part = meter.task(units);
+                    self.run_task(task, &|at| part.report(at))?;
+                    part.complete();
                 }
             }
             Ok(())

@@ -4,7 +4,7 @@ use crate::streams;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use skep::{Phase, Progress};
 use std::io::IsTerminal;
-use std::sync::Mutex;
+use std::sync::{Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
 /// Steps of the bar; finer ones are not visible.
@@ -26,6 +26,8 @@ pub struct Reporter {
     bar: ProgressBar,
     started: Instant,
     last: Mutex<Option<Shown>>,
+    /// The fraction that was done at the first report: by an earlier run that this one goes on with.
+    first: OnceLock<f64>,
 }
 
 /// What was shown last: only changes are drawn.
@@ -60,7 +62,13 @@ impl Display {
             Display::Silent | Display::Lines => ProgressBar::hidden(),
             Display::Bar => bar(),
         };
-        Reporter { display: self, bar, started: Instant::now(), last: Mutex::new(None) }
+        Reporter {
+            display: self,
+            bar,
+            started: Instant::now(),
+            last: Mutex::new(None),
+            first: OnceLock::new(),
+        }
     }
 }
 
@@ -78,12 +86,13 @@ impl Reporter {
         if last.is_some_and(|last| last == shown || shown.bar_steps < last.bar_steps) {
             return;
         }
+        let first = *self.first.get_or_init(|| progress.done);
         match self.display {
             Display::Silent => (),
             Display::Lines if last.is_some_and(|last| last.step == shown.step) => (),
-            Display::Lines => streams::notice(&line(progress, self.started.elapsed())),
+            Display::Lines => streams::notice(&line(progress, first, self.started.elapsed())),
             Display::Bar => {
-                self.bar.set_message(message(progress, self.started.elapsed()));
+                self.bar.set_message(message(progress, first, self.started.elapsed()));
                 self.bar.set_position(shown.bar_steps);
             }
         }
@@ -104,15 +113,15 @@ fn bar() -> ProgressBar {
 }
 
 /// The text beside the bar, for example `search at 1/2 size, cycle 1, view 3 of 7, 0:41 left`.
-fn message(progress: &Progress, elapsed: Duration) -> String {
+fn message(progress: &Progress, first: f64, elapsed: Duration) -> String {
     let view = format!("view {} of {}", progress.view + 1, progress.views);
-    format!("{}, {view}{}", step(progress), left(progress.done, elapsed))
+    format!("{}, {view}{}", step(progress), left(progress.done, first, elapsed))
 }
 
 /// A line without a bar, for example `search at full size, cycle 1, 7 views: 62 % done, 0:41 left`.
-fn line(progress: &Progress, elapsed: Duration) -> String {
+fn line(progress: &Progress, first: f64, elapsed: Duration) -> String {
     let percent = (progress.done * 100.0) as u32;
-    let left = left(progress.done, elapsed);
+    let left = left(progress.done, first, elapsed);
     format!("{}, {} views: {percent} % done{left}", step(progress), progress.views)
 }
 
@@ -125,12 +134,12 @@ fn step(progress: &Progress) -> String {
     }
 }
 
-/// `, 0:41 left`, or nothing while too little is done for an estimate.
-fn left(done: f64, elapsed: Duration) -> String {
-    if done < FIRST_ESTIMATE {
+/// `, 0:41 left`, or nothing while too little is done for an estimate; a fraction `first` was done before.
+fn left(done: f64, first: f64, elapsed: Duration) -> String {
+    if done - first < FIRST_ESTIMATE {
         return String::new();
     }
-    let seconds = (elapsed.as_secs_f64() * (1.0 - done.min(1.0)) / done).round() as u64;
+    let seconds = (elapsed.as_secs_f64() * (1.0 - done.min(1.0)) / (done - first)).round() as u64;
     let (hours, minutes, seconds) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
     match hours {
         0 => format!(", {minutes}:{seconds:02} left"),
@@ -147,25 +156,30 @@ mod tests {
 
     #[test]
     fn the_time_left_follows_from_the_fraction_done_and_the_time_elapsed() {
-        assert_eq!(left(0.25, Duration::from_secs(10)), ", 0:30 left");
-        assert_eq!(left(0.5, Duration::from_secs(3725)), ", 1:02:05 left");
-        assert_eq!(left(1.0, Duration::from_secs(10)), ", 0:00 left");
+        assert_eq!(left(0.25, 0.0, Duration::from_secs(10)), ", 0:30 left");
+        assert_eq!(left(0.5, 0.0, Duration::from_secs(3725)), ", 1:02:05 left");
+        assert_eq!(left(1.0, 0.0, Duration::from_secs(10)), ", 0:00 left");
+        assert_eq!(
+            left(0.75, 0.5, Duration::from_secs(10)),
+            ", 0:10 left",
+            "half was done by an earlier run"
+        );
     }
 
     #[test]
     fn no_time_left_is_printed_without_progress() {
-        assert_eq!(left(0.0, Duration::from_secs(10)), "");
+        assert_eq!(left(0.0, 0.0, Duration::from_secs(10)), "");
     }
 
     #[test]
     fn the_bar_names_phase_size_cycle_and_view_counted_from_one() {
-        let text = message(&QUARTER_DONE, Duration::from_secs(10));
+        let text = message(&QUARTER_DONE, 0.0, Duration::from_secs(10));
         assert_eq!(text, "search at 1/2 size, cycle 1, view 3 of 7, 0:30 left");
     }
 
     #[test]
     fn a_line_counts_all_views() {
         let progress = Progress { phase: Phase::Fusion, ..QUARTER_DONE };
-        assert_eq!(line(&progress, Duration::from_secs(10)), "fusion, 7 views: 25 % done, 0:30 left");
+        assert_eq!(line(&progress, 0.0, Duration::from_secs(10)), "fusion, 7 views: 25 % done, 0:30 left");
     }
 }

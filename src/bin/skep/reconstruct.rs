@@ -33,7 +33,9 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
     let interrupt = Interrupt::watch();
     // A report says that the files beside it are complete and of this run.
     let report = report_path(&output);
-    if let Err(error) = std::fs::remove_file(&report)
+    if job.is_complete() && report.is_file() {
+        display.print("the run was complete before: its files are compared with what it wrote");
+    } else if let Err(error) = std::fs::remove_file(&report)
         && error.kind() != std::io::ErrorKind::NotFound
     {
         return Err(Error::file(report, format!("cannot be replaced: {error}")).into());
@@ -53,7 +55,10 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
     let empty = (report.totals.points == 0).then(|| empty_cloud(&report.totals, &ranges, job.options()));
     report.warnings.extend(empty.clone());
     report.set_times(stopwatch.times());
-    report.write(&report_path(&output))?;
+    // One that is there is of the process that did the work, with its times.
+    if !report_path(&output).is_file() {
+        report.write(&report_path(&output))?;
+    }
 
     empty.iter().for_each(|warning| streams::warning(warning));
     if !run.quiet {
