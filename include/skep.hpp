@@ -16,7 +16,7 @@
 //
 // What skep.h says of each function holds here; this file only says what is different.
 //
-// Objects (Options, Scene, Result, Cloud, Stepper, Estimate, Candidates, PackedImage, NccWindow)
+// Objects (Options, Scene, Result, Cloud, Job, Stepper, Estimate, Candidates, PackedImage, NccWindow)
 // own what they stand for, can be moved and not copied, and get() is the C object, for calls that
 // are not wrapped. Using an object that was moved from is an error, not a crash.
 //
@@ -45,6 +45,7 @@
 
 #include "skep/error.hpp"
 #include "skep/files.hpp"
+#include "skep/job.hpp"
 #include "skep/kernels.hpp"
 #include "skep/object.hpp"
 #include "skep/options.hpp"

@@ -6,6 +6,7 @@ use super::camera::skep_camera;
 use super::estimate::skep_estimate_info;
 use super::fusion::skep_fusion_view;
 use super::image::skep_image;
+use super::job::skep_job_needs;
 use super::kernels::skep_plane;
 use super::progress::skep_progress;
 use super::result::{skep_cycle_record, skep_statistics};
@@ -55,6 +56,7 @@ layout! {
     skep_cycle { downscale, cycle_on_scale, food_sources, iterations }
     skep_estimate_info { view, cycle, is_checked, reserved, pixels, changed, validated, ncc_evaluations }
     skep_plane { normal, distance }
+    skep_job_needs { least_memory, memory, disk, cpu_seconds }
 }
 
 #[test]

@@ -18,6 +18,7 @@ mod estimate;
 mod files;
 mod fusion;
 mod image;
+mod job;
 mod kernels;
 #[cfg(test)]
 mod layout;

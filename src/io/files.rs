@@ -5,6 +5,27 @@ use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::{Component, Path, PathBuf};
 
+/// The first letters of the names of temporary files: a process that was killed leaves some.
+const TEMPORARY_PREFIX: &str = ".skep-tmp-";
+
+/// A temporary file in a folder, removed when it is dropped.
+pub(super) fn temporary_file(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
+    tempfile::Builder::new().prefix(TEMPORARY_PREFIX).tempfile_in(folder)
+}
+
+/// Removes the temporary files that killed processes left in a folder and those below it.
+pub(crate) fn remove_temporary_files(folder: &Path) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
+        if is_folder {
+            remove_temporary_files(&entry.path());
+        } else if entry.file_name().to_string_lossy().starts_with(TEMPORARY_PREFIX) {
+            // One that cannot be removed does no harm.
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}
+
 /// Writes a file under a temporary name in the same folder and renames it; a missing folder is created.
 pub fn write_file(
     path: &Path,
@@ -17,6 +38,7 @@ pub fn write_file(
     let attempt = || -> io::Result<()> {
         std::fs::create_dir_all(folder)?;
         let mut builder = tempfile::Builder::new();
+        builder.prefix(TEMPORARY_PREFIX);
         // Temporary files are private to the user; the result gets the permissions of the umask.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));

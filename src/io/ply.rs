@@ -1,6 +1,6 @@
 //! Fused clouds as COLMAP and viewers read them: `fused.ply` and `fused.ply.vis`.
 
-use super::files::{FileReader, cannot_be_read, cannot_be_written, write_file};
+use super::files::{FileReader, cannot_be_read, cannot_be_written, temporary_file, write_file};
 use crate::error::{Error, Result};
 use crate::fusion::{PointCloud, PointViews};
 use ply_rs_bw::parser::{Parser, Reader};
@@ -124,7 +124,7 @@ impl CloudWriter {
     pub(crate) fn new(path: &Path) -> Result<CloudWriter> {
         let temporary = || -> Result<BufWriter<NamedTempFile>> {
             let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-            let file = NamedTempFile::new_in(folder.unwrap_or(Path::new(".")));
+            let file = temporary_file(folder.unwrap_or(Path::new(".")));
             Ok(BufWriter::new(file.map_err(|error| cannot_be_written(path, error))?))
         };
         Ok(CloudWriter { path: path.to_owned(), points: temporary()?, views: temporary()?, count: 0 })

@@ -94,8 +94,10 @@ impl Job {
         let pool = JoinedPool::new(options.threads)?;
         let plan = pool.install(|| plan::read(&source, depth_range, options))?;
         let run = plan.manifest.run();
-        let notices = plan::prepare(&folder, &source, &plan, fresh)?;
-        pool.install(|| Job::new(folder, plan.scene, options, run, notices, lock))
+        let mut job = pool.install(|| Job::new(folder, plan.scene, options, run, lock))?;
+        // Last: a run that cannot begin leaves the folder as it was.
+        job.notices = plan::prepare(&job.folder, &source, &job.scene, &plan.manifest, fresh)?;
+        Ok(job)
     }
 
     /// Opens a run that was planned, to do some of its tasks; other processes may do others at the same time.
@@ -116,17 +118,10 @@ impl Job {
         let lock = folder.lock(Access::Tasks)?;
         let scene = plan::read_planned(&folder, &manifest, &options)?;
         let pool = JoinedPool::new(options.threads)?;
-        pool.install(|| Job::new(folder, scene, &options, manifest.run(), Vec::new(), lock))
+        pool.install(|| Job::new(folder, scene, &options, manifest.run(), lock))
     }
 
-    fn new(
-        folder: RunFolder,
-        scene: Scene,
-        options: &Options,
-        run: u64,
-        notices: Vec<String>,
-        lock: File,
-    ) -> Result<Job> {
+    fn new(folder: RunFolder, scene: Scene, options: &Options, run: u64, lock: File) -> Result<Job> {
         // The first stepper knows the source views, from which the limit of the images follows.
         let planned = Stepper::with_image_limit(&scene, options, 0)?;
         let mut readers = vec![Vec::new(); scene.views().len()];
@@ -146,7 +141,7 @@ impl Job {
             readers,
             needs,
             shares,
-            notices,
+            notices: Vec::new(),
             _lock: lock,
         })
     }

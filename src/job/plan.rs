@@ -10,6 +10,7 @@ use crate::geometry::DepthRange;
 use crate::image::Photograph;
 use crate::io::{
     ColmapModel, ModelImage, SceneFolder, Workspace, cannot_be_read, link_or_copy, picture_from_bytes,
+    remove_temporary_files,
 };
 use crate::options::Options;
 use crate::scene::{Scene, View};
@@ -87,14 +88,15 @@ fn scene(folder: &SceneFolder, model: ColmapModel, manifest: &Manifest) -> Resul
 /// Files that cannot be replaced.
 pub(super) fn prepare(
     folder: &RunFolder,
-    scene: &SceneFolder,
-    plan: &Plan,
+    source: &SceneFolder,
+    scene: &Scene,
+    manifest: &Manifest,
     fresh: bool,
 ) -> Result<Vec<String>> {
     let mut notices = Vec::new();
     let is_own = folder.manifest().is_file() || folder.report().is_file();
     if !is_own {
-        refuse_other_scene(folder, scene)?;
+        refuse_other_scene(folder, source)?;
     }
     let earlier = match Manifest::read(&folder.manifest()) {
         Ok(earlier) => earlier,
@@ -103,10 +105,11 @@ pub(super) fn prepare(
             None
         }
     };
-    let goes_on = !fresh && earlier.as_ref() == Some(&plan.manifest);
+    remove_temporary_files(folder.root());
+    let goes_on = !fresh && earlier.as_ref() == Some(manifest);
     if !goes_on {
         if let Some(earlier) = earlier.filter(|_| !fresh) {
-            let differences = plan.manifest.differences(&earlier);
+            let differences = manifest.differences(&earlier);
             notices.push(format!(
                 "the run in {} was made from something else and begins anew; changed: {}",
                 folder.root().display(),
@@ -115,11 +118,11 @@ pub(super) fn prepare(
         }
         remove_run(folder)?;
     }
-    adopt(folder, scene, plan)?;
+    adopt(folder, source, manifest)?;
     let workspace = Workspace::new(folder.root());
-    workspace.write_lists(plan.scene.views().iter().map(|view| view.name.as_str()))?;
+    workspace.write_lists(scene.views().iter().map(|view| view.name.as_str()))?;
     if !goes_on {
-        plan.manifest.write(&folder.manifest())?;
+        manifest.write(&folder.manifest())?;
     }
     Ok(notices)
 }
@@ -184,10 +187,10 @@ fn remove(path: &Path) -> Result<()> {
 
 /// Puts the scene into the run's folder: photographs as hard links where the file system can, and the model.
 /// What differs from the scene is replaced.
-fn adopt(folder: &RunFolder, scene: &SceneFolder, plan: &Plan) -> Result<()> {
+fn adopt(folder: &RunFolder, scene: &SceneFolder, manifest: &Manifest) -> Result<()> {
     let images = folder.root().join("images");
     if !is_same(&images, &scene.images) {
-        for entry in &plan.manifest.photographs {
+        for entry in &manifest.photographs {
             let (from, to) = (scene.images.join(&entry.name), images.join(&entry.name));
             let is_there = std::fs::read(&to).is_ok_and(|bytes| fingerprint(&bytes) == entry.content);
             if !is_there {

@@ -1,10 +1,10 @@
-//! Ctrl-C and SIGTERM: the exit status, what is printed, and that files are complete.
+//! Ctrl-C, SIGTERM and kill -9: the exit status, what is printed, and that the same command goes on.
 
-use super::layouts::map;
-use super::{HEIGHT, WIDTH, board, command, files, path, small_board};
-use std::fs;
+use super::{board, command, files, path, skep, small_board, text};
 use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::time::Duration;
 use tempfile::TempDir;
 
 /// Starts a run and sends it a signal once a line of its progress begins with `cue`; gives its exit status
@@ -19,40 +19,50 @@ fn interrupted(arguments: &[&str], cue: &str, signal: &str) -> (Option<i32>, Str
     (process.wait().unwrap().code(), printed)
 }
 
+/// The results below a folder: all files but those of the run itself and the report with its times.
+pub(super) fn results(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let relative = |path: &Path| path.strip_prefix(folder).unwrap().to_owned();
+    let is_result = |path: &Path| !path.starts_with("run") && !path.ends_with("report.json");
+    let all = files(folder).into_iter().map(|(path, _)| relative(&path)).filter(|path| is_result(path));
+    all.map(|path| (path.clone(), std::fs::read(folder.join(path)).unwrap())).collect()
+}
+
 #[test]
-fn ctrl_c_and_sigterm_during_the_search_leave_everything_as_it_was() {
-    let output = TempDir::new().unwrap();
-    let earlier = output.path().join("report.json");
+fn ctrl_c_and_sigterm_end_with_status_130_and_say_how_to_go_on() {
     for signal in ["-INT", "-TERM"] {
-        fs::write(&earlier, "of an earlier run").unwrap();
-        let board = board();
+        let (output, board) = (TempDir::new().unwrap(), board());
         let arguments = ["reconstruct", board.to_str().unwrap(), "--output", path(&output)];
         let (status, printed) = interrupted(&arguments, "search", signal);
         assert_eq!(status, Some(130), "{printed}");
-        assert!(printed.contains("interrupted: nothing was written"), "{printed}");
-        assert_eq!(files(output.path()), [(earlier.clone(), 17)]);
+        assert!(printed.contains("interrupted") && printed.contains("the same command goes on"), "{printed}");
+        assert!(!output.path().join("report.json").exists(), "only finished runs have a report");
+        assert!(!output.path().join("fused.ply").exists());
     }
 }
 
 #[test]
-fn ctrl_c_during_the_writing_leaves_complete_files() {
+fn a_run_that_is_killed_goes_on_and_gives_the_same_bits() {
     let scene = small_board();
-    let (status, printed) = interrupted(&["reconstruct", path(&scene)], "writing", "-INT");
-    let dense = scene.path().join("dense");
-    // The few files may be written before the signal arrives.
-    let finished = status == Some(0);
-    assert!(finished || status == Some(130) && printed.contains("complete"), "{status:?} {printed}");
-    assert_eq!(finished, dense.join("report.json").exists(), "only finished runs have a report");
-    let stereo = dense.join("stereo");
-    // It may also arrive before the first file.
-    let written = if stereo.exists() { files(&stereo) } else { Vec::new() };
-    for (path, _) in written.into_iter().filter(|(path, _)| path.extension().is_some_and(|e| e == "bin")) {
-        let channels = match path.components().any(|part| part.as_os_str() == "normal_maps") {
-            true => 3,
-            false => 1,
-        };
-        let is_graph = path.components().any(|part| part.as_os_str() == "consistency_graphs");
-        let whole = is_graph || map(&path, WIDTH / 4, HEIGHT / 4, channels).is_some();
-        assert!(whole, "{} is not complete", path.display());
+    let (whole, killed) = (TempDir::new().unwrap(), TempDir::new().unwrap());
+    let arguments = |output| ["reconstruct", path(&scene), "--preset", "fast", "--quiet", "--output", output];
+    let done = skep(&arguments(path(&whole)));
+    assert!(done.status.success(), "{}", text(&done.stderr));
+
+    let tasks = killed.path().join("run/tasks");
+    let count = || std::fs::read_dir(&tasks).map_or(0, Iterator::count);
+    let mut kills = 0;
+    for least in [3, 20, 40] {
+        let mut process = command(&arguments(path(&killed))).spawn().unwrap();
+        while count() < least && process.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        kills += usize::from(process.try_wait().unwrap().is_none());
+        process.kill().unwrap();
+        process.wait().unwrap();
+        assert!(count() >= least, "what is done is kept");
     }
+    assert!(kills > 0, "every process was faster than the test");
+    let done = skep(&arguments(path(&killed)));
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    assert!(results(whole.path()) == results(killed.path()));
 }

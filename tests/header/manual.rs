@@ -9,7 +9,7 @@ use super::{config, options, root};
 use std::fmt::Write;
 
 /// A section of the manual: the file it is made from, and its title.
-const SECTIONS: [(&str, &str); 14] = [
+const SECTIONS: [(&str, &str); 15] = [
     ("status", "Statuses, errors and versions"),
     ("options", "Options"),
     ("camera", "Cameras"),
@@ -24,6 +24,7 @@ const SECTIONS: [(&str, &str); 14] = [
     ("estimate", "Estimates of single views"),
     ("kernels", "Kernels"),
     ("files", "Files"),
+    ("job", "Runs in a folder"),
 ];
 const OBJECTS: &str = "Objects";
 /// Files whose contents continue the section of the file before the underscore.

@@ -252,6 +252,13 @@ impl Run {
 }
 
 impl Fuse {
+    /// Whether the cloud is that of a run in the folder, with the run's options.
+    pub fn is_task(&self) -> bool {
+        let changes_nothing = self.set.is_empty() && self.min_confidence.is_none();
+        let is_run = self.workspace.join("run").join("manifest.json").is_file();
+        changes_nothing && self.scene.is_none() && self.output.is_none() && is_run
+    }
+
     /// The options of the fusion.
     pub fn options(&self) -> Result<FusionOptions> {
         let mut options = Options::default();
@@ -343,6 +350,7 @@ The workspace is what `skep reconstruct` or `colmap patch_match_stereo` writes: 
 stereo/normal_maps. Its scene, images/ and sparse/, is in WORKSPACE or in the folder above it.
 The geometric (validated) maps are fused if any view has one, else the photometric (raw) ones.
 FILE.ply.vis, the views of each point, is written beside FILE.ply.
+In the folder of a run of skep, without other arguments, this is the run's last task, with its options.
 
 Examples:
   skep fuse SCENE/dense

@@ -3,20 +3,27 @@
 use crate::arguments::Fuse;
 use crate::interrupt::Interrupt;
 use crate::progress::Display;
-use crate::{Failure, streams};
+use crate::{Failure, streams, tasks};
 use skep::fusion::{FusionView, fuse, overlaps};
 use skep::io::{SceneFolder, Workspace, WorkspaceMaps};
-use skep::{Error, FusionOptions, PointCloud, Progress};
+use skep::job::{self, Job, Task};
+use skep::{Error, FusionOptions, Options, PointCloud, Progress};
 
 /// Runs the command.
 pub fn run(arguments: &Fuse) -> Result<(), Failure> {
     let display = Display::new(arguments.quiet);
+    if arguments.is_task() {
+        return task(arguments, display);
+    }
     display.print(&format!("reading {}", arguments.workspace.display()));
     let workspace = Workspace::new(&arguments.workspace);
     let scene = match &arguments.scene {
         Some(folder) => SceneFolder::find(folder)?,
         None => workspace.find_scene()?,
     };
+    for problem in job::check_maps(&arguments.workspace, &scene)? {
+        streams::warning(&problem);
+    }
     let maps = workspace.read(&scene)?;
     if !maps.missing.is_empty() {
         let missing = maps.missing.join(", ");
@@ -40,6 +47,16 @@ pub fn run(arguments: &Fuse) -> Result<(), Failure> {
     if !arguments.quiet {
         summary(&maps, &cloud).iter().for_each(|line| streams::result(line));
         streams::result(&format!("{} points in {}", cloud.positions.len(), output.display()));
+    }
+    Ok(())
+}
+
+/// Does the last task of a run.
+fn task(arguments: &Fuse, display: Display) -> Result<(), Failure> {
+    let job = Job::open(&arguments.workspace, &Options::default())?;
+    tasks::run(&job, &[Task::Fuse], display)?;
+    if !arguments.quiet {
+        streams::result(&format!("the cloud is {}", job.workspace().cloud().display()));
     }
     Ok(())
 }

@@ -8,8 +8,9 @@ From calibrated photographs to depth, normal and source-view maps and a fused po
     result = skep.reconstruct(scene, progress=lambda progress: print(f"{progress.done:.0%}"))
     depth, points = result[0].depth, result.cloud.positions
 
-There are three levels, which can be mixed: whole runs (`reconstruct`), the stages of a run on single views
-(`Stepper`), and kernels (`plane_homographies`, `patch_ncc`).
+There are four levels, which can be mixed: whole runs (`reconstruct`), runs in a folder that may be larger
+than memory and go on after an interruption (`Job`), the stages of a run on single views (`Stepper`), and
+kernels (`plane_homographies`, `patch_ncc`).
 
 Conventions: x_cam = R x_world + t with x right, y down, z forward; depth is z; the center of the
 top-left pixel is (0, 0). Input arrays are copied, or read only during the call. The same input, options
@@ -28,6 +29,7 @@ from ._files import (
     write_depth_map,
     write_normal_map,
 )
+from ._job import Job, JobNeeds, Task
 from ._kernels import NccWindow, PackedImage, patch_ncc, plane_homographies, plane_through
 from ._native import ffi as _ffi, lib as _lib
 from ._options import Options
@@ -64,6 +66,8 @@ __all__ = [
     "FileError",
     "FusionView",
     "InternalError",
+    "Job",
+    "JobNeeds",
     "NccWindow",
     "Options",
     "PackedImage",
@@ -76,6 +80,7 @@ __all__ = [
     "Scene",
     "Statistics",
     "Stepper",
+    "Task",
     "from_pycolmap",
     "fuse",
     "patch_ncc",

@@ -50,7 +50,7 @@ then raises `Cancelled`; an exception cancels it too, and is raised by the call.
 class _Call:
     """A call under way in its own thread."""
 
-    def __init__(self, call: Callable[[Any, Any, Any], int], kind: str) -> None:
+    def __init__(self, call: Callable[..., int], kind: str) -> None:
         self.changed = threading.Condition()
         self.latest: Progress | None = None
         self.cancelled = False
@@ -60,13 +60,14 @@ class _Call:
         # Not a daemon: the interpreter must not end while the library uses it.
         self.thread = threading.Thread(target=self.make, args=(call, kind), name="skep")
 
-    def make(self, call: Callable[[Any, Any, Any], int], kind: str) -> None:
+    def make(self, call: Callable[..., int], kind: str) -> None:
         callback = ffi.callback("skep_progress_fn", self.receive, error=1)
-        out = ffi.new(f"{kind} **")
+        out = [ffi.new(f"{kind} **")] if kind else []
         try:
             # Here, because the text of an error is kept for the thread that made the call.
-            check(call(callback, ffi.NULL, out))
-            self.found = ffi.gc(out[0], getattr(lib, f"{kind}_destroy"))
+            check(call(callback, ffi.NULL, *out))
+            if out:
+                self.found = ffi.gc(out[0][0], getattr(lib, f"{kind}_destroy"))
         except BaseException as failure:
             self.failure = failure
         with self.changed:
@@ -99,7 +100,7 @@ class _Call:
                 self.cancelled = True
 
 
-def run(call: Callable[[Any, Any, Any], int], kind: str, progress: ProgressFunction | None) -> Any:
+def run(call: Callable[..., int], kind: str, progress: ProgressFunction | None) -> Any:
     """Runs `call(progress_function, user, out)` and waits until it has ended; returns the object of this kind
     that it created, or raises its error.
     """
@@ -115,6 +116,13 @@ def run(call: Callable[[Any, Any, Any], int], kind: str, progress: ProgressFunct
     if under_way.failure is not None:
         raise under_way.failure
     return under_way.found
+
+
+def run_plain(call: Callable[..., int], progress: ProgressFunction | None) -> None:
+    """Runs `call(progress_function, user)`, which creates no object, and waits until it has ended; raises its
+    error.
+    """
+    run(call, "", progress)
 
 
 def _join(thread: threading.Thread) -> None:
