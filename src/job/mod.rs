@@ -312,6 +312,12 @@ impl Job {
         if progress(&Progress { phase, downscale, cycle: at.cycle, view, views, done: 0.0 }).is_break() {
             return Err(Error::Cancelled);
         }
+        for &other in self.stepper.sources(view).iter().chain(&[view as u32]) {
+            if self.record(Task::Search { cycle, view: other as usize }).is_none() {
+                let value = format!("{cycle}, before the search of view {other} is done");
+                return Err(Error::argument("cycle", value, "a cycle whose views are all searched"));
+            }
+        }
         let load = |&source: &u32| {
             self.estimates
                 .searched(&self.stepper, cycle, source as usize)

@@ -18,7 +18,7 @@ fn reconstruct(scene: &Path, output: &Path, more: &[&str]) -> String {
 /// A scene and its run.
 fn finished() -> (TempDir, PathBuf) {
     let scene = small_board();
-    let output = scene.path().join("run");
+    let output = scene.path().join("dense");
     reconstruct(scene.path(), &output, &[]);
     (scene, output)
 }
@@ -74,7 +74,7 @@ fn a_task_before_its_inputs_is_refused_and_names_what_is_missing() {
         assert!(printed.contains(expected), "{arguments:?}: {printed}");
     };
     refused(&["search", "--cycle", "1"], "before the tasks of cycle 0 are done");
-    refused(&["check", "--cycle", "0"], "cycle00-00000.searched");
+    refused(&["check", "--cycle", "0"], "is done; expected a cycle whose views are all searched");
     refused(&["next", "--cycle", "0"], "before the check of view 0 is done");
     refused(&["finish"], "before the last cycle is done");
     refused(&["fuse"], "before view 0 is finished");
