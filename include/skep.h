@@ -223,7 +223,8 @@ size_t skep_last_error(char *buffer, size_t capacity);
  *       Seed of the random generator; the same seed gives the same bits.
  *       whole number, 0 to 18446744073709551615, any; default: 0
  *   threads
- *       Worker threads; 0 takes one for each core. The result does not depend on it.
+ *       Worker threads at most; 0 takes one for each core. At most four for each core are started, and no
+ *       more than the images keep busy. The result does not depend on it.
  *       whole number, 0 to 4096, threads; default: 0
  *   simd
  *       Instruction set: scalar, baseline, v3, or best for the best the machine has; the result does not
@@ -618,6 +619,11 @@ typedef struct skep_image {
 /*
  * Images are copied when a view is added, and shared from then on: runs do not copy them again. A run uses
  * the scene as it is when the run starts; later changes do not affect it.
+ *
+ * What skep_scene_validate, skep_scene_get_depth_range, _get_sources, _get_overlap and
+ * _get_triangulation_angle derive from the scene is kept until the scene is changed: the first call after a
+ * change works through the whole scene, the next ones only look up what is known. Source views are kept for
+ * the last options asked for.
  */
 
 /**
@@ -780,7 +786,8 @@ skep_status skep_scene_get_depth_range(const struct skep_scene *scene,
                                        double *far_out);
 
 /**
- * Gets the source views that a run with these options matches a view with.
+ * Gets the source views that a run with these options matches a view with. Of more than 1,000 views only
+ * those that share sparse points and the 256 whose cameras are the nearest are considered for each.
  *
  * @param scene            The scene.
  * @param options_or_null  The options; NULL: the default preset.
@@ -800,8 +807,9 @@ skep_status skep_scene_get_sources(const struct skep_scene *scene,
                                    size_t *count_out);
 
 /**
- * Gets the views that fusion compares with a view: those that share a sparse point with it, or all others
- * when it observes none.
+ * Gets the views that fusion compares with a view: those that share a sparse point with it. A view that
+ * shares none with any other is compared with all others and they with it; of more than 1,000 views, with
+ * the 256 whose cameras are the nearest.
  *
  * @param scene      The scene.
  * @param view       Number of the view.

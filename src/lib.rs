@@ -211,7 +211,7 @@ pub use options::{
 pub use parallel::{Phase, Progress, ProgressFn, ignore_progress};
 pub use pipeline::{
     AnyEstimate, Candidates, Checked, Cycle, CycleRecord, EstimateRef, OwnMaps, Reconstruction, Searched,
-    Stepper, ViewEstimate, ViewResult, reconstruct,
+    Stepper, ViewEstimate, ViewResult, reconstruct, thread_count,
 };
 pub use scene::{Maps, PixelStatus, Scene, SparsePoint, View};
 

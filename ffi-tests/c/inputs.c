@@ -235,6 +235,42 @@ static void check_extremes(const skep_options *options) {
     }
 }
 
+/* What was asked for before a change is derived anew after it. */
+static void check_queries_after_changes(void) {
+    static const uint8_t PIXELS[3] = {10, 200, 30};
+    const skep_image image = {PIXELS, 3, 1, 3, SKEP_FORMAT_GRAY};
+    skep_camera camera = {3, 3, 1, 0, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
+    skep_scene *changing = NULL;
+    REQUIRE(skep_scene_create(&changing));
+    for (uint32_t view = 0; view < 5; ++view) {
+        camera.translation[0] = -0.2 * view;
+        REQUIRE(skep_scene_add_view(changing, NULL, &image, &camera, NULL));
+        REQUIRE(skep_scene_set_depth_range(changing, view, 1, 4));
+        if (view < 3) {
+            continue;
+        }
+        uint32_t others[5] = {9, 9, 9, 9, 9};
+        size_t count = 0;
+        double degrees = 0, same = 0;
+        REQUIRE(skep_scene_get_overlap(changing, 0, others, 5, &count));
+        REQUIRE(skep_scene_get_triangulation_angle(changing, 0, 1, &degrees));
+        if (view == 4) {
+            CHECK(count == 2 && others[0] == 1 && others[1] == 4, "the view without points too");
+            break;
+        }
+        CHECK(count == 3, "%zu views overlap without points", count);
+        const double positions[18] = {0, 0, 9, 0, 0, 9, 0, 0, 9, 0.5, 0, 2, 0.5, 0, 2, 0.5, 0, 2};
+        const uint32_t counts[6] = {2, 2, 2, 2, 2, 2};
+        const uint32_t seen_by[12] = {0, 1, 0, 1, 0, 1, 2, 3, 2, 3, 2, 3};
+        REQUIRE(skep_scene_add_points(changing, positions, 6, counts, seen_by, 12));
+        REQUIRE(skep_scene_get_overlap(changing, 0, others, 5, &count));
+        CHECK(count == 1 && others[0] == 1, "%zu views share points", count);
+        REQUIRE(skep_scene_get_triangulation_angle(changing, 0, 1, &same));
+        CHECK(same < degrees, "%g degrees at the points, %g in the middle", same, degrees);
+    }
+    skep_scene_destroy(changing);
+}
+
 void test_inputs(const char *folder) {
     (void)folder;
     scene made;
@@ -249,6 +285,7 @@ void test_inputs(const char *folder) {
     check_sources(&made, handed_in, options);
     check_seed_and_simd(&made, handed_in, options);
     check_extremes(options);
+    check_queries_after_changes();
     skep_scene_destroy(handed_in);
     skep_options_destroy(options);
     scene_free(&made);

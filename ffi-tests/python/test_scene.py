@@ -38,6 +38,18 @@ def test_a_scene_tells_what_it_was_given():
     scene.validate()
 
 
+def test_answers_follow_the_changes_of_a_scene():
+    scene = skep.Scene()
+    for x in range(4):
+        camera = skep.Camera(CAMERA.K, t=[-0.2 * x, 0, 0])
+        scene.add_view(GRAY, camera, depth_range=(1.0, 4.0))
+    assert scene.overlap(0) == (1, 2, 3)
+    scene.add_points([[0.0, 0, 3], [0.5, 0, 3]], [[0, 1], [2, 3]])
+    assert scene.overlap(0) == (1,)
+    scene.add_view(GRAY, CAMERA, depth_range=(1.0, 4.0))
+    assert scene.overlap(0) == (1, 4) and scene.overlap(4) == (0, 1, 2, 3)
+
+
 def test_masked_pixels_have_no_depth_and_say_why():
     scene = made.scene()
     mask = np.ones((made.HEIGHT, made.WIDTH + 3), dtype=bool)[:, 3:]

@@ -11,7 +11,8 @@
 //       Seed of the random generator; the same seed gives the same bits.
 //       whole number, 0 to 18446744073709551615, any; default: 0
 //   threads
-//       Worker threads; 0 takes one for each core. The result does not depend on it.
+//       Worker threads at most; 0 takes one for each core. At most four for each core are started, and no
+//       more than the images keep busy. The result does not depend on it.
 //       whole number, 0 to 4096, threads; default: 0
 //   simd
 //       Instruction set: scalar, baseline, v3, or best for the best the machine has; the result does not

@@ -58,7 +58,8 @@ pub unsafe extern "C" fn skep_scene_write_colmap(
     guard(|| {
         // SAFETY: as the header demands of the caller.
         let (scene, folder) = unsafe { (get(scene, "scene")?, path(folder, "folder")?) };
-        Ok(io::write_scene(folder, &scene.checked()?)?)
+        let scene = scene.checked()?;
+        Ok(io::write_scene(folder, &scene)?)
     })
 }
 

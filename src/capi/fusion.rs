@@ -11,7 +11,7 @@ use super::status::{Failure, guard, skep_status};
 use crate::fusion::{self, FusionView};
 use crate::geometry::Camera;
 use crate::image::Picture;
-use crate::parallel::JoinedPool;
+use crate::parallel::{JoinedPool, useful_threads};
 use crate::scene::Maps;
 use std::ffi::c_void;
 use std::sync::Arc;
@@ -151,7 +151,8 @@ pub unsafe extern "C" fn skep_fuse(
             })
             .collect();
         let host = Host::new(progress_or_null, user);
-        let pool = JoinedPool::new(options.threads)?;
+        let rows = views.iter().map(|view| view.height as usize).max().unwrap_or(0);
+        let pool = JoinedPool::new(useful_threads(options.threads, rows))?;
         let points = pool.install(|| fusion::fuse(&fused, &options.fusion, &|at| host.tell(at)))?;
         out.give(skep_cloud { points: Arc::new(points) });
         Ok(())

@@ -30,6 +30,7 @@ mod result;
 mod result_maps;
 mod scene;
 mod scene_queries;
+mod scene_state;
 mod status;
 mod stepper;
 mod stepper_stages;

@@ -129,7 +129,8 @@ pub unsafe extern "C" fn skep_reconstruct(
             (get(scene, "scene")?, options_or_default(options_or_null)?, out(result_out, "result_out")?)
         };
         let host = Host::new(progress_or_null, user);
-        let found = reconstruct(&scene.checked()?, &options, &|at| host.tell(at))?;
+        let scene = scene.checked()?;
+        let found = reconstruct(&scene, &options, &|at| host.tell(at))?;
         out.give(skep_result {
             views: (0..).zip(found.views).collect(),
             points: Some(Arc::new(found.points)),

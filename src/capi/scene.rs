@@ -4,37 +4,40 @@ use super::camera::skep_camera;
 use super::image::skep_image;
 use super::maps;
 use super::pointers::{self, destroy, get, out, slice, text, wanted_one};
+use super::scene_state::{CheckedScene, SceneState};
 use super::status::{Failure, guard, skep_status};
 use crate::geometry::DepthRange;
 use crate::scene::{Scene, SparsePoint, View};
 use glam::DVec3;
 use std::ffi::c_char;
-use std::sync::RwLock;
+use std::sync::{Arc, RwLock};
 
 /// Views (photographs with cameras) and sparse points.
 ///
 /// Images are copied when a view is added, and shared from then on: runs do not copy them again. A run uses
 /// the scene as it is when the run starts; later changes do not affect it.
+///
+/// What skep_scene_validate, skep_scene_get_depth_range, _get_sources, _get_overlap and
+/// _get_triangulation_angle derive from the scene is kept until the scene is changed: the first call after a
+/// change works through the whole scene, the next ones only look up what is known. Source views are kept for
+/// the last options asked for.
 pub struct skep_scene {
-    pub(super) inner: RwLock<Parts>,
-}
-
-#[derive(Default)]
-pub(super) struct Parts {
-    pub(super) views: Vec<View>,
-    points: Vec<SparsePoint>,
+    pub(super) inner: RwLock<SceneState>,
 }
 
 impl skep_scene {
     pub fn new(scene: Scene) -> skep_scene {
-        let (views, points) = scene.into_parts();
-        skep_scene { inner: RwLock::new(Parts { views, points }) }
+        skep_scene { inner: RwLock::new(SceneState::new(scene)) }
     }
 
-    /// The checked scene as it is now.
-    pub fn checked(&self) -> Result<Scene, Failure> {
-        let parts = pointers::read(&self.inner)?;
-        Ok(Scene::new(parts.views.clone(), parts.points.clone())?)
+    /// The checked scene as it is now. Only the first call after a change checks it.
+    pub(super) fn checked(&self) -> Result<Arc<CheckedScene>, Failure> {
+        // Copied out of the lock before the next one is taken.
+        let known = pointers::read(&self.inner)?.checked();
+        match known {
+            Some(scene) => Ok(scene),
+            None => Ok(pointers::write(&self.inner)?.check()?),
+        }
     }
 
     /// Calls `work` with one view.
@@ -43,15 +46,19 @@ impl skep_scene {
         view: u32,
         work: impl FnOnce(&View) -> Result<R, Failure>,
     ) -> Result<R, Failure> {
-        let parts = pointers::read(&self.inner)?;
-        work(parts.views.get(view as usize).ok_or_else(|| no_view(view, parts.views.len()))?)
+        let state = pointers::read(&self.inner)?;
+        let views = state.views();
+        work(views.get(view as usize).ok_or_else(|| no_view(view, views.len()))?)
     }
 
     /// Changes one view.
     fn change(&self, view: u32, work: impl FnOnce(&mut View) -> Result<(), Failure>) -> Result<(), Failure> {
-        let mut parts = pointers::write(&self.inner)?;
-        let views = parts.views.len();
-        work(parts.views.get_mut(view as usize).ok_or_else(|| no_view(view, views))?)
+        let mut state = pointers::write(&self.inner)?;
+        let views = state.views().len();
+        if view as usize >= views {
+            return Err(no_view(view, views));
+        }
+        work(&mut state.parts().0[view as usize])
     }
 }
 
@@ -116,13 +123,13 @@ pub unsafe extern "C" fn skep_scene_add_view(
         };
         // SAFETY: as the header demands of the caller.
         let place = unsafe { wanted_one(view_out, "view_out") }?;
-        let mut parts = pointers::write(&scene.inner)?;
-        let index = parts.views.len();
+        let mut state = pointers::write(&scene.inner)?;
+        let index = state.views().len();
         let name = name.unwrap_or_else(|| format!("view{index:04}.png"));
-        if parts.views.iter().any(|view| view.name == name) {
+        if state.views().iter().any(|view| view.name == name) {
             return Err(Failure::argument("name", format!("{name} again"), "a different name for each view"));
         }
-        parts.views.push(View { name, picture, camera, mask: None, depth_range: None, sources: None });
+        state.parts().0.push(View { name, picture, camera, mask: None, depth_range: None, sources: None });
         if let Some(place) = place {
             place.set(index as u32);
         }
@@ -271,7 +278,7 @@ pub unsafe extern "C" fn skep_scene_add_points(
             let expected = format!("the sum of view_counts, {}", view_total - rest.len());
             return Err(Failure::argument("view_total", view_total, expected));
         }
-        pointers::write(&scene.inner)?.points.extend(points);
+        pointers::write(&scene.inner)?.parts().1.extend(points);
         Ok(())
     })
 }

@@ -5,7 +5,6 @@ use super::options::{options_or_default, skep_options};
 use super::pointers::{self, get, give_list, give_text, out, wanted_one};
 use super::scene::{no_view, skep_scene};
 use super::status::{Failure, guard, skep_status};
-use crate::{fusion, view_selection};
 use std::ffi::c_char;
 
 /// Gets the number of views.
@@ -20,7 +19,7 @@ pub unsafe extern "C" fn skep_scene_get_view_count(
     guard(|| {
         // SAFETY: as the header demands of the caller.
         let (scene, out) = unsafe { (get(scene, "scene")?, out(count_out, "count_out")?) };
-        out.set(pointers::read(&scene.inner)?.views.len() as u32);
+        out.set(pointers::read(&scene.inner)?.views().len() as u32);
         Ok(())
     })
 }
@@ -113,7 +112,8 @@ pub unsafe extern "C" fn skep_scene_get_depth_range(
     })
 }
 
-/// Gets the source views that a run with these options matches a view with.
+/// Gets the source views that a run with these options matches a view with. Of more than 1,000 views only
+/// those that share sparse points and the 256 whose cameras are the nearest are considered for each.
 ///
 /// @param scene            The scene.
 /// @param options_or_null  The options; NULL: the default preset.
@@ -138,15 +138,16 @@ pub unsafe extern "C" fn skep_scene_get_sources(
         let (scene, options) =
             unsafe { (get(scene, "scene")?.checked()?, options_or_default(options_or_null)?) };
         options.check()?;
-        let lists = view_selection::source_lists(&scene, &options).lists;
+        let lists = scene.source_lists(&options);
         let list = lists.get(view as usize).ok_or_else(|| no_view(view, lists.len()))?;
         // SAFETY: as the header demands of the caller.
         unsafe { give_list(list, sources, capacity, count_out, ("sources", "count_out")) }
     })
 }
 
-/// Gets the views that fusion compares with a view: those that share a sparse point with it, or all others
-/// when it observes none.
+/// Gets the views that fusion compares with a view: those that share a sparse point with it. A view that
+/// shares none with any other is compared with all others and they with it; of more than 1,000 views, with
+/// the 256 whose cameras are the nearest.
 ///
 /// @param scene      The scene.
 /// @param view       Number of the view.
@@ -166,7 +167,7 @@ pub unsafe extern "C" fn skep_scene_get_overlap(
     guard(|| {
         // SAFETY: as the header demands of the caller.
         let scene = unsafe { get(scene, "scene") }?.checked()?;
-        let overlaps = fusion::overlaps(scene.views().len(), scene.points());
+        let overlaps = scene.overlaps();
         let list = overlaps.get(view as usize).ok_or_else(|| no_view(view, overlaps.len()))?;
         // SAFETY: as the header demands of the caller.
         unsafe { give_list(list, views, capacity, count_out, ("views", "count_out")) }
@@ -201,7 +202,7 @@ pub unsafe extern "C" fn skep_scene_get_triangulation_angle(
         if reference == source {
             return Err(Failure::argument("source", source, "another view than the reference"));
         }
-        let angle = view_selection::triangulation_angle(&scene, reference as usize, source as usize);
+        let angle = scene.triangulation_angle(reference as usize, source as usize);
         out.set(angle.unwrap_or(-1.0));
         Ok(())
     })

@@ -5,7 +5,7 @@ use super::pointers::{destroy, get, give_list, out, wanted_one};
 use super::scene::{no_view, skep_scene};
 use super::status::{Failure, guard, skep_status};
 use crate::parallel::JoinedPool;
-use crate::pipeline::Stepper;
+use crate::pipeline::{Stepper, thread_count};
 
 /// The stages of a run on single views, for hosts that schedule views themselves. Immutable.
 ///
@@ -91,7 +91,7 @@ pub unsafe extern "C" fn skep_stepper_create(
         };
         let scene = scene.checked()?;
         options.check()?;
-        let pool = JoinedPool::new(options.threads)?;
+        let pool = JoinedPool::new(thread_count(&scene, &options))?;
         let stepper = pool.install(|| Stepper::new(&scene, &options))?;
         out.give(skep_stepper { stepper, pool });
         Ok(())

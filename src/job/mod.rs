@@ -25,8 +25,8 @@ use crate::fusion::{fuse_input, overlaps};
 use crate::geometry::DepthRange;
 use crate::io::{CloudWriter, ColmapModel, SceneFolder, Workspace, visibility_path};
 use crate::options::Options;
-use crate::parallel::{JoinedPool, Phase, Progress, ProgressFn};
-use crate::pipeline::{Checked, CycleRecord, EstimateRef, Stepper, ViewEstimate};
+use crate::parallel::{JoinedPool, Phase, Progress, ProgressFn, useful_threads};
+use crate::pipeline::{Checked, CycleRecord, EstimateRef, Stepper, ViewEstimate, thread_count};
 use crate::scene::Scene;
 use estimates::Estimates;
 use folder::{Access, RunFolder};
@@ -91,7 +91,8 @@ impl Job {
         let source = SceneFolder::find(scene)?;
         let folder = RunFolder::new(folder);
         let lock = folder.lock(Access::Whole)?;
-        let pool = JoinedPool::new(options.threads)?;
+        // How much work there is is known from the scene alone.
+        let pool = JoinedPool::new(useful_threads(options.threads, usize::MAX))?;
         let plan = pool.install(|| plan::read(&source, depth_range, options))?;
         let run = plan.manifest.run();
         let mut job = pool.install(|| Job::new(folder, plan.scene, options, run, lock))?;
@@ -117,7 +118,7 @@ impl Job {
         options.check()?;
         let lock = folder.lock(Access::Tasks)?;
         let scene = plan::read_planned(&folder, &manifest, &options)?;
-        let pool = JoinedPool::new(options.threads)?;
+        let pool = JoinedPool::new(thread_count(&scene, &options))?;
         pool.install(|| Job::new(folder, scene, &options, manifest.run(), lock))
     }
 
@@ -387,7 +388,8 @@ impl Job {
                 return Err(Error::argument("fuse", value, "a run whose views are all finished"));
             }
         }
-        let overlaps = overlaps(self.scene.views().len(), self.scene.points());
+        let centers: Vec<_> = self.scene.views().iter().map(|view| view.camera.center()).collect();
+        let overlaps = overlaps(&centers, self.scene.points());
         let limit = self.shares.images + self.shares.estimates;
         let views = FinishedViews::new(&self.scene, &self.workspace, overlaps, limit);
         let path = self.workspace.cloud();

@@ -4,7 +4,7 @@ use super::estimates::BYTES_PER_PIXEL;
 use crate::error::{Error, Result};
 use crate::memory::{available_memory, format_bytes};
 use crate::options::Options;
-use crate::pipeline::Stepper;
+use crate::pipeline::{Stepper, thread_count};
 use crate::scene::Scene;
 
 /// Fraction of the available memory that a run takes by default.
@@ -84,10 +84,7 @@ pub(super) fn needs(
     stepper: &Stepper,
     readers: &[Vec<u32>],
 ) -> Result<(Needs, Shares)> {
-    let threads = match options.threads {
-        0 => std::thread::available_parallelism().map_or(1, usize::from),
-        threads => threads,
-    };
+    let threads = thread_count(scene, options);
     let pixels: u64 = scene.views().iter().map(|view| view.camera.pixels() as u64).sum();
     let task = largest_task(scene, stepper, readers);
     // One bit of each pixel tells the fusion what is part of a point already.

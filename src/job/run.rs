@@ -5,6 +5,7 @@ use super::task::{Content, Record};
 use super::{Job, Task, ViewSummary, plan};
 use crate::error::{Error, Result};
 use crate::parallel::{JoinedPool, ProgressFn};
+use crate::pipeline::thread_count;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -47,7 +48,7 @@ impl Job {
         after_cycle: &(dyn Fn(usize) -> Result<()> + Sync),
     ) -> Result<Summary> {
         let mut warnings = self.stepper.warnings().to_vec();
-        JoinedPool::new(self.options.threads)?.install(|| {
+        JoinedPool::new(thread_count(&self.scene, &self.options))?.install(|| {
             warnings.extend(self.repair()?);
             self.run_all(progress, after_cycle)
         })?;
@@ -69,7 +70,7 @@ impl Job {
     /// The errors of [`Job::run_task`]. What is done stays done.
     pub fn run_tasks(&self, tasks: &[Task], progress: ProgressFn) -> Result<()> {
         let meter = Meter::new(progress, tasks.len() as u64);
-        JoinedPool::new(self.options.threads)?
+        JoinedPool::new(thread_count(&self.scene, &self.options))?
             .install(|| self.run_counted(tasks.iter().map(|&task| (task, 1)).collect(), &meter))
     }
 

@@ -31,7 +31,9 @@ pub use value::{Kind, OptionInfo, OptionValue};
 pub struct Options {
     /// Seed of the random generator; the same seed gives the same bits.
     pub seed: u64,
-    /// Worker threads, 0 to 4096; 0 takes one for each core. The result does not depend on it.
+    /// Worker threads at most, 0 to 4096; 0 takes one for each core. A run starts at most four for each core,
+    /// and no more than its images keep busy ([`thread_count`](crate::thread_count)). The result does not
+    /// depend on it.
     pub threads: usize,
     /// Bytes of memory that a run in a folder keeps to; 0 takes three quarters of what the machine or its
     /// control group allows. The result does not depend on it. Runs without a folder keep everything in
@@ -93,7 +95,8 @@ const MEMORY: &str = "memory";
 const OTHERS: &[Entry] = &[
     Entry {
         c_name: c"threads",
-        explanation: "Worker threads; 0 takes one for each core. The result does not depend on it.",
+        explanation: "Worker threads at most; 0 takes one for each core. At most four for each core are \
+                      started, and no more than the images keep busy. The result does not depend on it.",
         unit: "threads",
         kind: Kind::Count { min: 0, max: 4096 },
         get: |options| options.threads as f64,

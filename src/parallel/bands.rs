@@ -29,6 +29,11 @@ impl Bands {
         Bands { width, rows }
     }
 
+    /// The largest number of bands of an image, for any number of threads.
+    pub(crate) fn most(height: usize) -> usize {
+        height.div_ceil(MIN_ROWS)
+    }
+
     /// Pixels of a band.
     pub(crate) fn pixels(self) -> usize {
         self.width * self.rows

@@ -5,7 +5,7 @@ mod pool;
 mod progress;
 
 pub(crate) use bands::{Bands, run_bands};
-pub(crate) use pool::JoinedPool;
+pub(crate) use pool::{JoinedPool, useful_threads};
 pub use progress::{Phase, Progress, ProgressFn, ignore_progress};
 
 use crate::error::Result;

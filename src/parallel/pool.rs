@@ -3,6 +3,21 @@
 use crate::error::{Error, Result};
 use std::thread::JoinHandle;
 
+/// Number of threads for each core above which more of them only wait for each other: idle threads look for
+/// work at those that have some.
+const MAX_THREADS_PER_CORE: usize = 4;
+
+/// The number of threads for the option `threads`, which is an upper bound (0: one for each core), and for so
+/// many units of work that can be done at the same time.
+pub(crate) fn useful_threads(wanted: usize, units: usize) -> usize {
+    threads_on(std::thread::available_parallelism().map_or(1, usize::from), wanted, units)
+}
+
+fn threads_on(cores: usize, wanted: usize, units: usize) -> usize {
+    let wanted = if wanted == 0 { cores } else { wanted };
+    wanted.min(cores * MAX_THREADS_PER_CORE).min(units).max(1)
+}
+
 /// A rayon pool whose threads are joined when it is dropped; dropping rayon's own does not wait for them.
 pub(crate) struct JoinedPool {
     /// `None` only while it is dropped.
@@ -11,7 +26,7 @@ pub(crate) struct JoinedPool {
 }
 
 impl JoinedPool {
-    /// Starts this many threads; 0 takes one for each core.
+    /// Starts this many threads.
     ///
     /// # Errors
     /// The system cannot start them.
@@ -52,6 +67,13 @@ impl Drop for JoinedPool {
 mod tests {
     use super::*;
     use std::sync::Arc;
+
+    #[test]
+    fn threads_are_limited_by_the_option_the_cores_and_the_work() {
+        assert_eq!([0, 1, 3, 16, 17, 4096].map(|wanted| threads_on(4, wanted, 1000)), [4, 1, 3, 16, 16, 16]);
+        assert_eq!([0, 1, 4096].map(|wanted| threads_on(64, wanted, 10)), [10, 1, 10]);
+        assert_eq!(threads_on(4, 4096, 0), 1);
+    }
 
     #[test]
     fn dropping_the_pool_joins_its_threads() {

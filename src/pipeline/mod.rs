@@ -19,7 +19,7 @@ mod store;
 
 use crate::error::Result;
 use crate::options::Options;
-use crate::parallel::{JoinedPool, Phase, ProgressFn};
+use crate::parallel::{Bands, JoinedPool, Phase, ProgressFn, useful_threads};
 use crate::scene::Scene;
 use context::RunContext;
 pub(crate) use cycle::Place;
@@ -43,7 +43,14 @@ use store::Store;
 /// An option out of its range, named; [`crate::Error::Cancelled`] when `progress` returns `Break`.
 pub fn reconstruct(scene: &Scene, options: &Options, progress: ProgressFn) -> Result<Reconstruction> {
     options.check()?;
-    JoinedPool::new(options.threads)?.install(|| run(scene, options, progress))
+    JoinedPool::new(thread_count(scene, options))?.install(|| run(scene, options, progress))
+}
+
+/// The number of threads that [`reconstruct`] starts: that of the option `threads`, or one for each core; but
+/// at most four for each core, and no more than there are pairs of rows in all images.
+pub fn thread_count(scene: &Scene, options: &Options) -> usize {
+    let bands = scene.views().iter().map(|view| Bands::most(view.camera.height as usize));
+    useful_threads(options.threads, bands.sum())
 }
 
 /// The cycles of all scales, coarse to fine, then the end of the run.

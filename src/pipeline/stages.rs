@@ -24,6 +24,7 @@ use crate::refine::speckles::RemoveSpeckles;
 use crate::refine::textureless::{FillTextureless, halos};
 use crate::scene::{PixelEstimate, PlaneMap, ScaledView, Scene, Verdict};
 use crate::view_selection::{ViewRules, select_sets};
+use glam::DVec3;
 use rayon::prelude::*;
 
 /// The planes that other views propagate to the pixels of a view; none in a scale's first cycle or with
@@ -433,7 +434,8 @@ pub(super) fn fuse(
     results: &[ViewResult],
     progress: ProgressFn,
 ) -> Result<PointCloud> {
-    let overlaps = fusion::overlaps(results.len(), scene.points());
+    let centers: Vec<DVec3> = scene.views().iter().map(|view| view.camera.center()).collect();
+    let overlaps = fusion::overlaps(&centers, scene.points());
     let pictures: Vec<Picture> =
         scene.views().iter().map(|view| view.picture.load()).collect::<Result<_>>()?;
     let views: Vec<FusionView> = (scene.views().iter().zip(results).zip(&overlaps).zip(&pictures))

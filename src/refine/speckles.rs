@@ -108,7 +108,7 @@ mod tests {
     fn a_slanted_surface_is_one_island() {
         // Depths of the wall differ by more than 2 % between pixels that are a few columns apart.
         assert_eq!(removed(300, wall_with(|_, _| Some(1.0))), 0);
-        let checkered = |x: usize, y: usize| ((x + y) % 2 == 0).then_some(1.0);
+        let checkered = |x: usize, y: usize| (x + y).is_multiple_of(2).then_some(1.0);
         assert_eq!(removed(1, wall_with(checkered)), 36 * 28 / 2, "each pixel by itself");
     }
 }

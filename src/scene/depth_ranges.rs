@@ -1,6 +1,6 @@
 //! The depth range of each view: its own, or one derived from the sparse points.
 
-use super::{SparsePoint, View};
+use super::{SparsePoint, Tracks, View};
 use crate::error::{Error, Result};
 use crate::geometry::DepthRange;
 
@@ -48,12 +48,13 @@ impl Known {
 /// A view for which there is none of these. Without any sparse point the views must have ranges of their
 /// own: those of other views, given for these alone, are not taken over.
 pub(super) fn depth_ranges(views: &[View], points: &[SparsePoint]) -> Result<DepthRanges> {
+    let tracks = Tracks::new(views.len(), points);
     let known = views
         .iter()
         .enumerate()
         .map(|(index, view)| match view.depth_range {
             Some(range) => Ok(Some(Known::Reliable(range))),
-            None => derive(view, index as u32, points),
+            None => derive(view, tracks.points_of(index), points),
         })
         .collect::<Result<Vec<Option<Known>>>>()?;
     let union = if points.is_empty() { None } else { union(known.iter().flatten().map(Known::range)) };
@@ -92,9 +93,8 @@ pub(super) fn depth_ranges(views: &[View], points: &[SparsePoint]) -> Result<Dep
 }
 
 /// The range of the points that a view saw or, where it saw none, of those that project into its image.
-fn derive(view: &View, index: u32, points: &[SparsePoint]) -> Result<Option<Known>> {
-    let seen = points.iter().filter(|point| point.views.contains(&index));
-    let depths = seen.map(|point| view.camera.to_camera(point.position).z);
+fn derive(view: &View, seen: impl Iterator<Item = usize>, points: &[SparsePoint]) -> Result<Option<Known>> {
+    let depths = seen.map(|point| view.camera.to_camera(points[point].position).z);
     if let Some(range) = range_of_depths(&view.name, depths.filter(|&depth| depth > 0.0).collect())? {
         return Ok(Some(Known::Reliable(range)));
     }

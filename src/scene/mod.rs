@@ -4,8 +4,10 @@ mod compact_plane;
 mod depth_ranges;
 mod image_cache;
 mod maps;
+mod nearest_views;
 mod plane_map;
 mod scaled_view;
+mod tracks;
 
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, DepthRange};
@@ -15,8 +17,10 @@ use depth_ranges::{DepthRanges, depth_ranges};
 use glam::DVec3;
 pub(crate) use image_cache::ImageCache;
 pub use maps::{Maps, PixelStatus};
+pub(crate) use nearest_views::{MAX_VIEWS_FOR_ALL_PAIRS, nearest_views};
 pub(crate) use plane_map::{PixelEstimate, PlaneMap, Verdict, validated_planes};
 pub(crate) use scaled_view::ScaledView;
+pub(crate) use tracks::Tracks;
 
 /// One calibrated photograph.
 #[derive(Debug, Clone)]
@@ -67,31 +71,18 @@ impl Scene {
     /// invalid camera, range or point; a point or source list with an index that is no view; a source list
     /// with the view itself or a view twice; a view without range where there are no sparse points, or
     /// where no view has a range.
-    pub fn new(views: Vec<View>, points: Vec<SparsePoint>) -> Result<Scene> {
-        if views.len() < 2 {
-            return Err(Error::argument("views", views.len(), "at least 2 views"));
-        }
-        check_names(&views)?;
-        for (index, view) in views.iter().enumerate() {
-            let name = format!("views[{index}] ({})", view.name);
-            check_view(view, &name)?;
-            check_sources(&name, index, view.sources.as_deref().unwrap_or_default(), views.len())?;
-        }
-        for (index, point) in points.iter().enumerate() {
-            if !point.position.is_finite() {
-                return Err(Error::argument(
-                    format!("points[{index}]"),
-                    point.position,
-                    "finite coordinates",
-                ));
-            }
-            if let Some(view) = point.views.iter().find(|&&view| view as usize >= views.len()) {
-                let expected = format!("an index below the number of views, {}", views.len());
-                return Err(Error::argument(format!("points[{index}].views"), view, expected));
-            }
-        }
-        let DepthRanges { ranges: depth_ranges, outer: outer_ranges, warnings } =
-            depth_ranges(&views, &points)?;
+    pub fn new(mut views: Vec<View>, mut points: Vec<SparsePoint>) -> Result<Scene> {
+        Scene::take(&mut views, &mut points)
+    }
+
+    /// [`Scene::new`], which takes the views and points only where they are valid: a caller who changes and
+    /// checks them in turns needs no copy.
+    ///
+    /// # Errors
+    /// The errors of [`Scene::new`]; the views and points stay as they are.
+    pub(crate) fn take(views: &mut Vec<View>, points: &mut Vec<SparsePoint>) -> Result<Scene> {
+        let DepthRanges { ranges: depth_ranges, outer: outer_ranges, warnings } = check(views, points)?;
+        let (views, points) = (std::mem::take(views), std::mem::take(points));
         Ok(Scene { views, points, depth_ranges, outer_ranges, warnings })
     }
 
@@ -126,6 +117,29 @@ impl Scene {
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
+}
+
+/// Checks views and points, and determines the depth ranges.
+fn check(views: &[View], points: &[SparsePoint]) -> Result<DepthRanges> {
+    if views.len() < 2 {
+        return Err(Error::argument("views", views.len(), "at least 2 views"));
+    }
+    check_names(views)?;
+    for (index, view) in views.iter().enumerate() {
+        let name = format!("views[{index}] ({})", view.name);
+        check_view(view, &name)?;
+        check_sources(&name, index, view.sources.as_deref().unwrap_or_default(), views.len())?;
+    }
+    for (index, point) in points.iter().enumerate() {
+        if !point.position.is_finite() {
+            return Err(Error::argument(format!("points[{index}]"), point.position, "finite coordinates"));
+        }
+        if let Some(view) = point.views.iter().find(|&&view| view as usize >= views.len()) {
+            let expected = format!("an index below the number of views, {}", views.len());
+            return Err(Error::argument(format!("points[{index}].views"), view, expected));
+        }
+    }
+    depth_ranges(views, points)
 }
 
 fn check_names(views: &[View]) -> Result<()> {

@@ -1,9 +1,9 @@
 //! The source list of each view: the views whose triangulation angle with it lies in a range.
 
+use super::shared_angles::{SharedAngles, quantile};
 use crate::options::Options;
-use crate::scene::{Scene, View};
+use crate::scene::{MAX_VIEWS_FOR_ALL_PAIRS, Scene, View, nearest_views};
 use glam::{DVec2, DVec3};
-use std::collections::HashMap;
 
 /// The source lists of all views.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -16,13 +16,6 @@ pub(crate) struct SourceLists {
     pub warnings: Vec<String>,
 }
 
-/// Triangulation angles, in degrees, at the sparse points that a pair of views shares; the lower index first.
-type SharedAngles = HashMap<(usize, usize), Vec<f64>>;
-
-/// Minimum number of shared points: with fewer, one false match decides the angle.
-const MIN_SHARED_POINTS: usize = 3;
-/// Quantile of the angles at shared points that is the angle of the pair.
-const ANGLE_QUANTILE: f64 = 0.75;
 /// Number of source views taken from outside the range when none lies in it: validation needs at least two.
 const FALLBACK_SOURCES: usize = 2;
 /// The angle of the most useful source view, in degrees, and the spread of the logarithms of useful ones.
@@ -39,17 +32,27 @@ const GRID_FRACTIONS: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 /// The source list of every view: the one given with the scene, or else all views that overlap with it at a
 /// triangulation angle in the range of the options; where there are none, those with the angles nearest to
 /// the range.
+///
+/// All pairs of views are tried in a scene of at most 1,000 views. In a larger one a view is tried with those
+/// that share sparse points with it, and with the 256 that have the nearest cameras.
 pub(crate) fn source_lists(scene: &Scene, options: &Options) -> SourceLists {
-    let shared = shared_angles(scene);
+    let are_given = scene.views().iter().all(|view| view.sources.is_some());
+    let shared = if are_given { SharedAngles::default() } else { SharedAngles::new(scene) };
+    source_lists_by_angle(scene, &shared, options)
+}
+
+/// [`source_lists`] for angles that are known.
+pub(crate) fn source_lists_by_angle(scene: &Scene, shared: &SharedAngles, options: &Options) -> SourceLists {
+    let centers: Vec<DVec3> = scene.views().iter().map(|view| view.camera.center()).collect();
     let mut lists = SourceLists::default();
     for (index, view) in scene.views().iter().enumerate() {
         if let Some(sources) = &view.sources {
             lists.add(view, sources.clone(), options);
             continue;
         }
-        let pairs: Vec<Pair> = (0..scene.views().len())
-            .filter(|&other| other != index)
-            .filter_map(|other| Pair::new(scene, &shared, index, other))
+        let pairs: Vec<Pair> = tried(&centers, shared, index)
+            .into_iter()
+            .filter_map(|other| Pair::new(scene, shared, index, other as usize))
             .collect();
         let list = select(scene, index, pairs, options);
         let inside = list.iter().filter(|pair| pair.is_inside(options)).count();
@@ -65,15 +68,25 @@ pub(crate) fn source_lists(scene: &Scene, options: &Options) -> SourceLists {
 /// The triangulation angle of two views in degrees, as [`source_lists`] uses it: the 75th percentile of the
 /// angles at the sparse points that both saw or, where these are fewer than three, at points in the middle of
 /// the reference view's depth range; `None` where no such point is in both images.
-pub(crate) fn triangulation_angle(scene: &Scene, reference: usize, source: usize) -> Option<f64> {
-    angle_of_pair(scene, &shared_angles(scene), reference, source)
+pub(crate) fn triangulation_angle(
+    scene: &Scene,
+    shared: &SharedAngles,
+    reference: usize,
+    source: usize,
+) -> Option<f64> {
+    let at_middle_depth = || quantile(&mut angles_at_middle_depth(scene, reference, source), 1);
+    shared.angle(reference, source).or_else(at_middle_depth)
 }
 
-fn angle_of_pair(scene: &Scene, shared: &SharedAngles, reference: usize, source: usize) -> Option<f64> {
-    match shared.get(&(reference.min(source), reference.max(source))) {
-        Some(angles) if angles.len() >= MIN_SHARED_POINTS => quantile(angles.clone()),
-        _ => quantile(angles_at_middle_depth(scene, reference, source)),
+/// The views that are tried as source views of a view.
+fn tried(centers: &[DVec3], shared: &SharedAngles, view: usize) -> Vec<u32> {
+    let mut tried = nearest_views(centers, view);
+    if centers.len() > MAX_VIEWS_FOR_ALL_PAIRS {
+        tried.extend(shared.partners(view));
+        tried.sort_unstable();
+        tried.dedup();
     }
+    tried
 }
 
 impl SourceLists {
@@ -103,7 +116,7 @@ struct Pair {
 
 impl Pair {
     fn new(scene: &Scene, shared: &SharedAngles, reference: usize, source: usize) -> Option<Pair> {
-        let angle = angle_of_pair(scene, shared, reference, source)?;
+        let angle = triangulation_angle(scene, shared, reference, source)?;
         Some(Pair { source: source as u32, angle })
     }
 
@@ -185,24 +198,6 @@ fn describe_fallback(name: &str, fallback: &[Pair], options: &Options) -> String
     )
 }
 
-/// The triangulation angles of all pairs of views at the sparse points.
-fn shared_angles(scene: &Scene) -> SharedAngles {
-    let centers: Vec<DVec3> = scene.views().iter().map(|view| view.camera.center()).collect();
-    let mut shared = SharedAngles::new();
-    for point in scene.points() {
-        let mut views: Vec<usize> = point.views.iter().map(|&view| view as usize).collect();
-        views.sort_unstable();
-        views.dedup();
-        for (index, &a) in views.iter().enumerate() {
-            for &b in &views[index + 1..] {
-                let angle = (centers[a] - point.position).angle_between(centers[b] - point.position);
-                shared.entry((a, b)).or_default().push(angle.to_degrees());
-            }
-        }
-    }
-    shared
-}
-
 /// Triangulation angles, in degrees, at points on a grid of rays of the reference view, in the middle of its
 /// depth range; only at points inside the other view's image. The angle of the optical axes will not do: it
 /// is 0 for parallel cameras.
@@ -222,11 +217,4 @@ fn angles_at_middle_depth(scene: &Scene, reference: usize, source: usize) -> Vec
         }
     }
     angles
-}
-
-/// The quantile of the angles at [`ANGLE_QUANTILE`]; `None` of none.
-fn quantile(mut angles: Vec<f64>) -> Option<f64> {
-    angles.sort_by(f64::total_cmp);
-    let last = angles.len().checked_sub(1)?;
-    Some(angles[(last as f64 * ANGLE_QUANTILE).round() as usize])
 }

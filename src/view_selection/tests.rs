@@ -262,6 +262,26 @@ fn parallel_cameras_have_sources() {
 }
 
 #[test]
+fn views_of_large_scenes_are_tried_with_the_nearest_and_with_those_that_share_points() {
+    let row = |views: u32| -> Vec<Camera> {
+        let camera = |x: f64| looking_at(DVec3::new(x, 0.0, 0.0), DVec3::new(x, 0.0, 1.0), (41, 31), 40.0);
+        (0..views).map(|view| camera(0.0015 * f64::from(view))).collect()
+    };
+    // 10 degrees at the middle depth are 353 views away, a little more at the sides of the image.
+    let ordinary = lists(&row(1000), &[], &ten_to_thirty());
+    assert!((340..380).contains(&ordinary.lists[0][0]), "{}", ordinary.lists[0][0]);
+    // The 256 nearest views have smaller angles, of which the two largest are taken, with a warning.
+    let large = lists(&row(1001), &[], &ten_to_thirty());
+    assert_eq!(large.lists[0], [256, 255]);
+    assert_eq!(large.warnings.len(), 1001);
+    // Views that share points are tried at any distance.
+    let both: &[u32] = &[0, 1000];
+    let shared = lists(&row(1001), &[(DVec3::new(0.8, 0.0, 4.0), both); 3], &ten_to_thirty());
+    assert_eq!((&shared.lists[0][..], &shared.lists[1000][..]), (&[1000][..], &[0][..]));
+    assert_eq!(shared.warnings.len(), 999);
+}
+
+#[test]
 fn without_angles_in_the_range_the_nearest_are_used_with_a_warning() {
     let points: [(DVec3, &[u32]); 3] = [(DVec3::ZERO, &[0, 1, 2, 3]); 3];
     let result = lists(&around(&[0.0, 2.0, 5.0, 7.0]), &points, &ten_to_thirty());

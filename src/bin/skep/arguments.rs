@@ -46,7 +46,8 @@ pub struct Run {
     /// time; paper follows the paper literally and is slow
     #[arg(long, default_value = "default", value_parser = Options::PRESETS)]
     pub preset: String,
-    /// Worker threads; 0 uses one for each core. The result does not depend on it
+    /// Worker threads at most; 0 uses one for each core. At most four for each core are started, and no more
+    /// than the images keep busy. The result does not depend on it
     #[arg(short, long, value_name = "N", default_value_t = 0)]
     threads: usize,
     /// Seed of the random generator; the same seed gives the same result
@@ -102,7 +103,7 @@ pub struct Plan {
 pub struct Planned {
     /// Folder of the run, as planned by `skep plan`
     pub folder: PathBuf,
-    /// Worker threads; 0 uses one for each core
+    /// Worker threads at most; 0 uses one for each core
     #[arg(short, long, value_name = "N", default_value_t = 0)]
     threads: usize,
     /// Memory to keep to, such as 8GiB [default: three quarters of what the machine allows]

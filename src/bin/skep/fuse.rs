@@ -67,7 +67,8 @@ fn fuse_maps(
     display: Display,
     interrupt: &Interrupt,
 ) -> skep::Result<PointCloud> {
-    let overlaps = overlaps(maps.views.len(), &maps.points);
+    let centers: Vec<_> = maps.views.iter().map(|view| view.camera.center()).collect();
+    let overlaps = overlaps(&centers, &maps.points);
     let views: Vec<FusionView> = maps
         .views
         .iter()

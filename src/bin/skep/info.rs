@@ -17,7 +17,7 @@ pub fn run(arguments: &Info) -> Result<(), Failure> {
 }
 
 /// The number of threads of `--threads 0`.
-pub fn cores() -> usize {
+fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 

@@ -5,8 +5,7 @@ use crate::interrupt::Interrupt;
 use crate::progress::Display;
 use crate::report::{Report, Totals};
 use crate::stopwatch::{Stage, Stopwatch};
-use crate::{Failure, streams};
-use crate::{dump, info};
+use crate::{Failure, dump, streams};
 use skep::io::Workspace;
 use skep::job::{Job, Needs, Summary};
 use skep::{DepthRange, Error, Options, PixelStatus, Progress, Result, Scene, format_bytes};
@@ -77,13 +76,15 @@ pub fn plan(run: &Run, display: Display) -> std::result::Result<Job, Failure> {
     job.notices().iter().for_each(|notice| streams::warning(notice));
     job.scene().warnings().iter().for_each(|warning| streams::warning(warning));
     display.print(&needs(&job));
+    let threads = skep::thread_count(job.scene(), &options);
+    fewer_threads(options.threads, threads).iter().for_each(|line| display.print(line));
     Ok(job)
 }
 
 /// What the run needs, in a line.
 fn needs(job: &Job) -> String {
     let Needs { least_memory, memory, disk, cpu_seconds } = job.needs();
-    let threads = if job.options().threads == 0 { info::cores() } else { job.options().threads };
+    let threads = skep::thread_count(job.scene(), job.options());
     let seconds = cpu_seconds / threads as f64;
     let time = match seconds {
         ..100.0 => format!("{seconds:.0} s"),
@@ -123,6 +124,15 @@ fn with_progress(
 fn require_writable(folder: &Path) -> Result<()> {
     let attempt = std::fs::create_dir_all(folder).and_then(|()| tempfile::tempfile_in(folder));
     attempt.map(drop).map_err(|error| Error::file(folder, format!("cannot be written to: {error}")))
+}
+
+/// What is said of threads that are not started, if any.
+fn fewer_threads(wanted: usize, threads: usize) -> Option<String> {
+    (threads < wanted).then(|| {
+        format!(
+            "{threads} threads instead of {wanted}: more would wait for a core, or for work in these images"
+        )
+    })
 }
 
 fn report_path(output: &Path) -> PathBuf {
@@ -224,6 +234,13 @@ mod tests {
     fn totals(points: usize, counts: [u64; 6]) -> Totals {
         let status_counts = PixelStatus::ALL.iter().map(|status| status.name()).zip(counts).collect();
         Totals { pixels: 1000, points, status_counts, ..Totals::default() }
+    }
+
+    #[test]
+    fn threads_that_are_not_started_are_named() {
+        assert_eq!((fewer_threads(0, 8), fewer_threads(8, 8)), (None, None));
+        let line = fewer_threads(4096, 8).unwrap();
+        assert!(line.starts_with("8 threads instead of 4096"), "{line}");
     }
 
     #[test]

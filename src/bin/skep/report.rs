@@ -1,7 +1,6 @@
 //! `report.json`: counts, times and options of a run. Tools read it: keys are stable, and new ones may be
 //! added.
 
-use crate::info;
 use crate::stopwatch::Times;
 use serde::Serialize;
 use serde_json::Value;
@@ -81,7 +80,7 @@ impl Report {
         Report {
             version: env!("CARGO_PKG_VERSION"),
             simd: options.simd.unwrap_or_else(SimdLevel::detect).name(),
-            threads: if options.threads == 0 { info::cores() } else { options.threads },
+            threads: skep::thread_count(scene, options),
             preset: preset.to_owned(),
             options: options.values().map(|(name, value)| (name, typed(value))).collect(),
             warnings: scene.warnings().iter().chain(&result.warnings).cloned().collect(),

@@ -173,8 +173,10 @@ class Scene:
         return take_indices(lambda *out: lib.skep_scene_get_sources(self._handle, chosen, view, *out))
 
     def overlap(self, view: int) -> tuple[int, ...]:
-        """The views that fusion compares with a view: those that share a sparse point with it, else all
-        others.
+        """The views that fusion compares with a view: those that share a sparse point with it.
+
+        A view that shares none with any other is compared with all others and they with it; of more than
+        1,000 views, with the 256 whose cameras are the nearest.
         """
         index(view, "view")
         return take_indices(lambda *out: lib.skep_scene_get_overlap(self._handle, view, *out))
