@@ -7,9 +7,9 @@
 //!
 #![doc = include_str!("../docs/pipeline.svg")]
 //!
-//! # Three levels
+//! # Four levels
 //!
-//! They can be mixed; each has a program in `examples/rust/`.
+//! They can be mixed; most have a program in `examples/rust/`.
 //!
 //! **A whole run** ([`reconstruct`]) takes a [`Scene`] and [`Options`] and gives maps of all views and a
 //! cloud:
@@ -34,6 +34,9 @@
 //! skep::io::write_ply("cloud.ply".as_ref(), &result.points)?;
 //! # Ok::<(), skep::Error>(())
 //! ```
+//!
+//! **A run in a folder** ([`job::Job`], feature `io`) reads a scene from files, keeps to a budget of memory,
+//! goes on after an interruption, and can be divided among processes and machines.
 //!
 //! **A stepwise run** ([`Stepper`]) searches, checks and finishes single views, for a host that schedules
 //! them itself, on one machine or many, or provides maps of its own. It gives the same bits as
@@ -155,7 +158,7 @@
 //! | feature | what it adds |
 //! |---|---|
 //! | `capi` (default) | the C ABI of `include/skep.h`, with `io` |
-//! | `io` | the module `io`: COLMAP models and maps, PNG and JPEG pictures, PLY, previews |
+//! | `io` | the modules `io` (COLMAP models and maps, PNG and JPEG pictures, PLY, previews) and `job` (runs in a folder) |
 //! | `cli` | the program `skep`, with `io` |
 //!
 //! Without any the crate depends on glam, rayon and wide alone.
@@ -166,7 +169,8 @@
 //!   the target (NEON, wasm simd128, SSE2) or scalar code. `SKEP_SIMD=scalar|baseline|v3` forces a level.
 //! - Pinhole cameras without distortion, images up to 32,768 pixels a side, 8 bits a channel (16 are
 //!   rounded). Matching uses the gray values.
-//! - The maps of all views are in memory during a whole run; [`Stepper`] lets a host keep them elsewhere.
+//! - The maps of all views are in memory during [`reconstruct`]; [`job::Job`] keeps to a budget, and [`Stepper`]
+//!   lets a host keep them elsewhere.
 //! - Two views are the least; the default validates what two other views confirm, and fuses what three
 //!   confirm.
 

@@ -18,6 +18,7 @@ static const struct {
     {"cancel", test_cancel},
     {"threads", test_threads},
     {"files", test_files},
+    {"job", test_job},
     {"misuse-scene", test_misuse_scene},
     {"misuse-run", test_misuse_run},
     {"misuse-stepper", test_misuse_stepper},

@@ -11,6 +11,7 @@ void test_kernels(const char *folder);
 void test_cancel(const char *folder);
 void test_threads(const char *folder);
 void test_files(const char *folder);
+void test_job(const char *folder);
 void test_misuse_scene(const char *folder);
 void test_misuse_run(const char *folder);
 void test_misuse_stepper(const char *folder);

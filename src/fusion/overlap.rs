@@ -3,8 +3,12 @@
 use crate::scene::{SparsePoint, Tracks, nearest_views};
 use glam::DVec3;
 
-/// For each view those that may see the same surface, ascending: those that saw a sparse point together with
-/// it. A view that saw none with any other may see the surfaces of all others, and so overlaps all of them,
+/// Views that a view chooses to be compared with: a surface that as many photographs show is averaged well
+/// enough, and the maps of all of them must be in memory at the same time.
+const MAX_CHOSEN: usize = 24;
+
+/// For each view those that are compared with it, ascending: those that saw a sparse point together with it, of
+/// more than 24 the ones with the most common points, and the views that choose it in this way. A view that saw none with any other may see the surfaces of all others, and so overlaps all of them,
 /// and they overlap it: the overlap of two views is mutual, so that a surface gives the same points whichever
 /// of them is the reference first.
 ///
@@ -15,17 +19,29 @@ use glam::DVec3;
 pub fn overlaps(centers: &[DVec3], points: &[SparsePoint]) -> Vec<Vec<u32>> {
     let views = centers.len();
     let tracks = Tracks::new(views, points);
-    let mut overlaps: Vec<Vec<u32>> = vec![Vec::new(); views];
-    // For each view the last one of a lower number that was found to overlap it.
-    let mut last = vec![usize::MAX; views];
+    // By view, the others with the number of common points.
+    let mut common: Vec<Vec<(u32, u32)>> = vec![Vec::new(); views];
+    let mut counts = vec![0u32; views];
     for view in 0..views {
+        let mut others = Vec::new();
         tracks.each_pair(view, |other, _| {
-            if last[other] != view {
-                last[other] = view;
-                overlaps[view].push(other as u32);
-                overlaps[other].push(view as u32);
+            if counts[other] == 0 {
+                others.push(other);
             }
+            counts[other] += 1;
         });
+        for other in others {
+            let count = std::mem::take(&mut counts[other]);
+            common[view].push((other as u32, count));
+            common[other].push((view as u32, count));
+        }
+    }
+    let mut overlaps: Vec<Vec<u32>> = vec![Vec::new(); views];
+    for (view, others) in common.into_iter().enumerate() {
+        for other in most_common(centers, view, others) {
+            overlaps[view].push(other);
+            overlaps[other as usize].push(view as u32);
+        }
     }
     let alone: Vec<usize> = (0..views).filter(|&view| overlaps[view].is_empty()).collect();
     for view in alone {
@@ -40,6 +56,14 @@ pub fn overlaps(centers: &[DVec3], points: &[SparsePoint]) -> Vec<Vec<u32>> {
         overlap.shrink_to_fit();
     }
     overlaps
+}
+
+/// The views with the most common points, at most [`MAX_CHOSEN`]; of equally many those with the nearest cameras,
+/// then those of lower numbers.
+fn most_common(centers: &[DVec3], view: usize, mut others: Vec<(u32, u32)>) -> impl Iterator<Item = u32> {
+    let distance = |other: u32| centers[other as usize].distance_squared(centers[view]);
+    others.sort_by(|a, b| b.1.cmp(&a.1).then(distance(a.0).total_cmp(&distance(b.0))).then(a.0.cmp(&b.0)));
+    others.into_iter().take(MAX_CHOSEN).map(|(other, _)| other)
 }
 
 #[cfg(test)]
@@ -69,15 +93,25 @@ mod tests {
     }
 
     #[test]
-    fn long_tracks_of_large_scenes_overlap_all_views_that_share_many_points() {
+    fn of_many_views_those_with_the_most_common_points_are_chosen_on_both_sides() {
         // 46 million pairs, of which 15 million are taken.
         let points: Vec<SparsePoint> = (0..2300).map(|index| point(index % 200..index % 200 + 200)).collect();
-        let found = overlaps(&[DVec3::ZERO; 400], &points);
-        // These share half of the points or more.
-        for view in 100..300u32 {
-            let mut near = (100..300).filter(|other| (1..=100).contains(&view.abs_diff(*other)));
-            assert!(near.all(|other| found[view as usize].contains(&other)), "{view}");
+        let centers: Vec<DVec3> = (0..400).map(|view| DVec3::X * f64::from(view)).collect();
+        let found = overlaps(&centers, &points);
+        assert!(is_mutual(&found));
+        for view in 150..250u32 {
+            let own = &found[view as usize];
+            assert!((24..=60).contains(&own.len()), "{view}: {}", own.len());
+            assert!(own.iter().all(|other| view.abs_diff(*other) < 60), "{view}: {own:?}");
         }
+    }
+
+    #[test]
+    fn of_equally_many_common_points_the_nearest_cameras_decide() {
+        let centers: Vec<DVec3> = (0..100).map(|view| DVec3::X * f64::from(view)).collect();
+        let found = overlaps(&centers, &[point(0..100), point(0..100)]);
+        assert!(found[50].iter().copied().eq((38..50).chain(51..63)));
+        assert!(found[0].iter().copied().eq(1..25));
         assert!(is_mutual(&found));
     }
 

@@ -14,7 +14,7 @@ pub(super) struct FinishedViews<'a> {
     pub scene: &'a Scene,
     pub workspace: &'a Workspace,
     /// The views that may see the same surface as a view.
-    pub overlaps: Vec<Vec<u32>>,
+    pub overlaps: &'a [Vec<u32>],
     kept: Cache<usize, Finished>,
 }
 
@@ -26,14 +26,14 @@ struct Finished {
 }
 
 /// Bytes of a view in memory for each pixel: depth, normal, confidence, gray and color.
-const BYTES_PER_PIXEL: usize = 24;
+pub(super) const BYTES_PER_PIXEL: usize = 24;
 
 impl<'a> FinishedViews<'a> {
     /// Keeps the views used last, of up to `limit` bytes, in memory.
     pub(super) fn new(
         scene: &'a Scene,
         workspace: &'a Workspace,
-        overlaps: Vec<Vec<u32>>,
+        overlaps: &'a [Vec<u32>],
         limit: usize,
     ) -> FinishedViews<'a> {
         FinishedViews { scene, workspace, overlaps, kept: Cache::new(limit) }

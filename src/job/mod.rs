@@ -31,6 +31,7 @@ use crate::scene::Scene;
 use estimates::Estimates;
 use folder::{Access, RunFolder};
 use fuse::FinishedViews;
+use glam::DVec3;
 use manifest::Manifest;
 pub use needs::Needs;
 use needs::Shares;
@@ -64,6 +65,8 @@ pub struct Job {
     estimates: Estimates,
     /// By view, the views that have it among their sources.
     readers: Vec<Vec<u32>>,
+    /// By view, the views that the fusion compares it with.
+    overlaps: Vec<Vec<u32>>,
     needs: Needs,
     shares: Shares,
     notices: Vec<String>,
@@ -129,7 +132,9 @@ impl Job {
         for view in 0..scene.views().len() {
             planned.sources(view).iter().for_each(|&source| readers[source as usize].push(view as u32));
         }
-        let (needs, shares) = needs::needs(&scene, options, &planned, &readers)?;
+        let centers: Vec<DVec3> = scene.views().iter().map(|view| view.camera.center()).collect();
+        let overlaps = overlaps(&centers, scene.points());
+        let (needs, shares) = needs::needs(&scene, options, &planned, &readers, &overlaps)?;
         let estimates = Estimates::new(&folder, run, shares.estimates);
         Ok(Job {
             workspace: Workspace::new(folder.root()),
@@ -140,6 +145,7 @@ impl Job {
             run,
             estimates,
             readers,
+            overlaps,
             needs,
             shares,
             notices: Vec::new(),
@@ -388,10 +394,8 @@ impl Job {
                 return Err(Error::argument("fuse", value, "a run whose views are all finished"));
             }
         }
-        let centers: Vec<_> = self.scene.views().iter().map(|view| view.camera.center()).collect();
-        let overlaps = overlaps(&centers, self.scene.points());
-        let limit = self.shares.images + self.shares.estimates;
-        let views = FinishedViews::new(&self.scene, &self.workspace, overlaps, limit);
+        let limit = self.shares.fusion;
+        let views = FinishedViews::new(&self.scene, &self.workspace, &self.overlaps, limit);
         let path = self.workspace.cloud();
         let mut cloud = CloudWriter::new(&path)?;
         fuse_input(&views, &self.options.fusion, progress, &mut |points| cloud.add(points))?;

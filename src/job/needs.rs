@@ -48,6 +48,8 @@ pub(super) struct Shares {
     pub images: usize,
     /// Bytes of estimates that are kept.
     pub estimates: usize,
+    /// Bytes of finished views that the fusion keeps beyond those it needs.
+    pub fusion: usize,
 }
 
 /// The bytes that a run keeps to: those of the option, or a fraction of what is available.
@@ -56,6 +58,15 @@ pub(super) fn budget(options: &Options) -> u64 {
         0 => available_memory().map_or(DEFAULT_MEMORY, |bytes| (bytes as f64 * DEFAULT_FRACTION) as u64),
         bytes => bytes,
     }
+}
+
+/// Bytes that the fusion needs: a view and those it is compared with, at the same time.
+fn fusion_bytes(scene: &Scene, overlaps: &[Vec<u32>]) -> u64 {
+    let bytes =
+        |view: usize| scene.views()[view].camera.pixels() as u64 * super::fuse::BYTES_PER_PIXEL as u64;
+    let group =
+        |view: usize| bytes(view) + overlaps[view].iter().map(|&other| bytes(other as usize)).sum::<u64>();
+    (0..scene.views().len()).map(group).max().unwrap_or(0)
 }
 
 /// Bytes of the largest task: a view with the estimates and images of all views it reads.
@@ -83,6 +94,7 @@ pub(super) fn needs(
     options: &Options,
     stepper: &Stepper,
     readers: &[Vec<u32>],
+    overlaps: &[Vec<u32>],
 ) -> Result<(Needs, Shares)> {
     let threads = thread_count(scene, options);
     let pixels: u64 = scene.views().iter().map(|view| view.camera.pixels() as u64).sum();
@@ -90,7 +102,8 @@ pub(super) fn needs(
     // One bit of each pixel tells the fusion what is part of a point already.
     let observations: u64 = scene.points().iter().map(|point| 48 + 4 * point.views.len() as u64).sum();
     let base = BASE + observations + pixels / 8;
-    let least_memory = base + task;
+    let fusion = fusion_bytes(scene, overlaps);
+    let least_memory = base + task.max(fusion);
     let memory = budget(options);
     if memory < least_memory {
         let expected =
@@ -110,8 +123,12 @@ pub(super) fn needs(
         .map(|downscale| pixels * IMAGE_BYTES / (downscale * downscale))
         .sum();
     let images = all_images.min(rest / 3);
-    let shares =
-        Shares { tasks: tasks as usize, images: images as usize, estimates: (rest - images) as usize };
+    let shares = Shares {
+        tasks: tasks as usize,
+        images: images as usize,
+        estimates: (rest - images) as usize,
+        fusion: (memory - base - fusion) as usize,
+    };
     let work: f64 = (0..scene.views().len())
         .map(|view| {
             let own = scene.views()[view].camera.pixels() as u64;
