@@ -1,10 +1,11 @@
 /* skep: dense multi-view stereo on the CPU. This file is generated; it is also the manual.
  *
  * Input: calibrated photographs. Output: depth maps, normal maps and view sets, and a fused point cloud.
- * There are three levels of functions, which can be mixed:
+ * There are four levels of functions, which can be mixed:
  *
  *   whole runs  skep_scene_create, skep_scene_add_view, ..., skep_reconstruct, skep_result_get_depth, ...
  *   stepwise    skep_stepper_create, then the stages of a run on single views; skep_fuse fuses any maps
+ *   in folders  skep_job_plan, skep_job_run: runs larger than memory, resumed, divided among machines
  *   kernels     skep_plane_homographies, skep_patch_ncc: stateless
  *
  * and files: skep_scene_read_colmap, skep_result_write_workspace and others, for programs without a parser.
@@ -53,6 +54,7 @@
  *   Estimates of single views
  *   Kernels
  *   Files
+ *   Runs in a folder
  */
 
 
@@ -84,6 +86,12 @@ typedef struct skep_cloud skep_cloud;
  * check also the view sets that it uses. Immutable.
  */
 typedef struct skep_estimate skep_estimate;
+
+/**
+ * A run in a folder: it keeps to a budget of memory, goes on after an interruption, and can be divided among
+ * processes and machines that share the folder. Immutable.
+ */
+typedef struct skep_job skep_job;
 
 /**
  * Sample positions of a patch and their weights. Immutable.
@@ -226,6 +234,10 @@ size_t skep_last_error(char *buffer, size_t capacity);
  *       Worker threads at most; 0 takes one for each core. At most four for each core are started, and no
  *       more than the images keep busy. The result does not depend on it.
  *       whole number, 0 to 4096, threads; default: 0
+ *   memory
+ *       Bytes of memory that a run in a folder keeps to; 0 takes three quarters of what the machine or its
+ *       control group allows. The result does not depend on it.
+ *       whole number, 0 to 9007199254740992, bytes; default: 0
  *   simd
  *       Instruction set: scalar, baseline, v3, or best for the best the machine has; the result does not
  *       depend on it.
@@ -412,6 +424,10 @@ size_t skep_last_error(char *buffer, size_t capacity);
  *       Fill small gaps from the surrounding planes after the last cycle, where the source views confirm
  *       them.
  *       switch, true or false; default: true, paper: false
+ *   refine.max_speckle_size
+ *       Largest number of pixels of a speckle after the last cycle: an island of validated planes that no
+ *       surface around it continues. Speckles lose their validation; 0 keeps them.
+ *       whole number, at least 0, pixels; default: 30, paper: 0
  *
  * Fusion: which pixels become points (section 6 of the paper).
  *   fusion.depth_tolerance
@@ -1705,14 +1721,15 @@ skep_status skep_stepper_next(const struct skep_stepper *stepper,
                               uint32_t *next_out);
 
 /**
- * Finishes a view after the last cycle. Four stages, in this order:
+ * Finishes a view after the last cycle. Five stages, in this order:
  *
  *   1. averaging of the validated planes with those of the source views (option
  *      "refine.cross_view_averaging"); reads the published surfaces of the last cycle of the view's sources
  *   2. gap filling from the surrounding planes (option "refine.fill_gaps")
  *   3. check of the filled pixels against the planes of the source views as they were before averaging:
  *      reads the checked planes of the last cycle of the view's sources; pixels that fail keep what they had
- *   4. classification: determines view set, cost and status of every pixel
+ *   4. speckle removal: small islands of planes lose their validation (option "refine.max_speckle_size")
+ *   5. classification: determines view set, cost and status of every pixel
  *
  * The estimates are not changed.
  *
@@ -2177,6 +2194,224 @@ skep_status skep_read_consistency_graph(const char *file,
                                         uint32_t *width_out,
                                         uint32_t *height_out,
                                         size_t *view_total_out);
+
+/* ---- Runs in a folder ---------------------------------------------------------------------------------- */
+
+/*
+ * A run is a set of tasks. skep_job_run does all of them; a host with a scheduler of its own calls
+ * skep_job_run_task in this order, those of a line at the same time if it likes, each process with a job that
+ * skep_job_open gave:
+ *
+ *   for each cycle, from 0:  SKEP_TASK_SEARCH of every view
+ *                            SKEP_TASK_CHECK of every view
+ *                            SKEP_TASK_NEXT
+ *   then                     SKEP_TASK_FINISH of every view
+ *                            SKEP_TASK_FUSE
+ *
+ * A task that is done, or of a cycle that the run skips, succeeds at once. The results are files in the
+ * folder, which is a COLMAP workspace: stereo/, preview/, fused.ply.
+ */
+
+/**
+ * Task: search the planes of a view in a cycle.
+ */
+#define SKEP_TASK_SEARCH 0
+
+/**
+ * Task: check the planes of a view in a cycle, after all views were searched.
+ */
+#define SKEP_TASK_CHECK 1
+
+/**
+ * Task: decide which cycle follows, after all views were checked.
+ */
+#define SKEP_TASK_NEXT 2
+
+/**
+ * Task: write the maps of a view, after the last cycle.
+ */
+#define SKEP_TASK_FINISH 3
+
+/**
+ * Task: fuse the maps, after all views are finished.
+ */
+#define SKEP_TASK_FUSE 4
+
+/**
+ * What a run needs, estimated before it starts.
+ */
+typedef struct skep_job_needs {
+    /**
+     * The least memory in bytes with which the run works.
+     */
+    uint64_t least_memory;
+    /**
+     * The memory in bytes that the run keeps to.
+     */
+    uint64_t memory;
+    /**
+     * Bytes on disk, at most at any time.
+     */
+    uint64_t disk;
+    /**
+     * CPU seconds of all threads together, within a factor of about two.
+     */
+    double cpu_seconds;
+} skep_job_needs;
+
+/**
+ * Plans the run of a COLMAP scene in a folder, which is created. A run of the same photographs, model,
+ * options and version that began there goes on; anything else begins anew, and skep_job_get_notice tells why.
+ * The options "threads", "memory" and "simd" may change. No other process can work on the run while the job
+ * exists.
+ *
+ * @param scene            Path of the folder with images/ and a COLMAP model in sparse/ or sparse/0/.
+ * @param near             Smallest depth of every view in world units; 0 with `far` 0 derives the ranges.
+ * @param far              Largest depth of every view in world units.
+ * @param options_or_null  The options, copied; NULL: the default preset.
+ * @param folder           Path of the folder of the run.
+ * @param fresh            Non-zero begins anew in any case.
+ * @param job_out          Receives the job; destroy it with skep_job_destroy.
+ * @retval SKEP_ERR_ARGUMENT  Options or depths out of range, less memory than the run needs, or a scene that
+ *                            skep_scene_validate refuses.
+ * @retval SKEP_ERR_FILE      A file that is missing or damaged; a folder that cannot be written, holds
+ *                            another scene, or in which another process works.
+ */
+skep_status skep_job_plan(const char *scene,
+                          double near,
+                          double far,
+                          const struct skep_options *options_or_null,
+                          const char *folder,
+                          int32_t fresh,
+                          struct skep_job **job_out);
+
+/**
+ * Opens a run that was planned, to do some of its tasks; other processes may do others at the same time.
+ *
+ * @param folder           Path of the folder of the run.
+ * @param options_or_null  Options "threads", "memory" and "simd"; the others are those the run was planned
+ *                         with. NULL: the default preset.
+ * @param job_out          Receives the job; destroy it with skep_job_destroy.
+ * @retval SKEP_ERR_ARGUMENT  Less memory than the run needs.
+ * @retval SKEP_ERR_FILE      No run of this version; a model that changed; another process that plans or does
+ *                            the whole run.
+ */
+skep_status skep_job_open(const char *folder,
+                          const struct skep_options *options_or_null,
+                          struct skep_job **job_out);
+
+/**
+ * Destroys a job and unlocks its folder; what is done stays there.
+ *
+ * @param job  The job; NULL is ignored.
+ */
+void skep_job_destroy(struct skep_job *job);
+
+/**
+ * Gets the number of cycles of the schedule, and of views.
+ *
+ * @param job              The job.
+ * @param cycle_count_out  Receives the number of cycles on all scales; may be NULL.
+ * @param view_count_out   Receives the number of views; may be NULL.
+ */
+skep_status skep_job_get_count(const struct skep_job *job,
+                               uint32_t *cycle_count_out,
+                               uint32_t *view_count_out);
+
+/**
+ * Gets what the run needs.
+ *
+ * @param job        The job.
+ * @param needs_out  Receives memory, disk and time.
+ */
+skep_status skep_job_get_needs(const struct skep_job *job, struct skep_job_needs *needs_out);
+
+/**
+ * Copies a notice on what became of an earlier run in the folder, or a warning about the scene.
+ *
+ * @param job         The job.
+ * @param index       Number of the notice, from 0.
+ * @param buffer      Receives up to `capacity` bytes, the last one NUL; may be NULL to ask for the size.
+ * @param capacity    Bytes of room in `buffer`; a longer text is cut.
+ * @param needed_out  Receives the bytes of the whole text with its NUL; may be NULL.
+ * @retval SKEP_ERR_ARGUMENT  No such notice.
+ */
+skep_status skep_job_get_notice(const struct skep_job *job,
+                                size_t index,
+                                char *buffer,
+                                size_t capacity,
+                                size_t *needed_out);
+
+/**
+ * Gets the views whose files the tasks of a view read, ascending: its own, its sources, and those whose
+ * source it is. A scheduler places tasks by them.
+ *
+ * @param job        The job.
+ * @param view       Number of the view.
+ * @param views      Receives `*count_out` numbers of views; may be NULL to ask for their number.
+ * @param capacity   Elements of room in `views`; at most the number of views is needed.
+ * @param count_out  Receives the number of views.
+ * @retval SKEP_ERR_ARGUMENT  No such view.
+ * @retval SKEP_ERR_CAPACITY  `capacity` is too small.
+ */
+skep_status skep_job_get_views_read(const struct skep_job *job,
+                                    uint32_t view,
+                                    uint32_t *views,
+                                    size_t capacity,
+                                    size_t *count_out);
+
+/**
+ * Does all tasks that are not done. Files that were damaged since they were written are made again.
+ *
+ * @param job               The job.
+ * @param progress_or_null  Receives the progress and may cancel; NULL: none.
+ * @param user              Passed to the callback; may be NULL.
+ * @param point_count_out   Receives the number of points; may be NULL.
+ * @retval SKEP_ERR_FILE       A file that cannot be read or written; what is done stays done, as in every
+ *                             other case.
+ * @retval SKEP_ERR_CANCELLED  The callback returned non-zero; the same call goes on from there.
+ */
+skep_status skep_job_run(const struct skep_job *job,
+                         skep_progress_fn progress_or_null,
+                         void *user,
+                         uint64_t *point_count_out);
+
+/**
+ * Does a task; nothing if it is done or needless. The tasks it depends on must be done. Several tasks may be
+ * done at the same time, by threads, processes or machines.
+ *
+ * @param job               The job.
+ * @param task              A SKEP_TASK_ value.
+ * @param cycle             Number of the cycle; ignored by SKEP_TASK_FINISH and SKEP_TASK_FUSE.
+ * @param view              Number of the view; ignored by SKEP_TASK_NEXT and SKEP_TASK_FUSE.
+ * @param progress_or_null  Receives the progress and may cancel; NULL: none.
+ * @param user              Passed to the callback; may be NULL.
+ * @retval SKEP_ERR_ARGUMENT   No such task, cycle or view; a task it depends on is not done.
+ * @retval SKEP_ERR_FILE       A file that is damaged, or cannot be written.
+ * @retval SKEP_ERR_CANCELLED  The callback returned non-zero.
+ */
+skep_status skep_job_run_task(const struct skep_job *job,
+                              uint32_t task,
+                              uint32_t cycle,
+                              uint32_t view,
+                              skep_progress_fn progress_or_null,
+                              void *user);
+
+/**
+ * Gets whether a task is done, or needless because a scale ended early.
+ *
+ * @param job       The job.
+ * @param task      A SKEP_TASK_ value.
+ * @param cycle     Number of the cycle; ignored by SKEP_TASK_FINISH and SKEP_TASK_FUSE.
+ * @param view      Number of the view; ignored by SKEP_TASK_NEXT and SKEP_TASK_FUSE.
+ * @param done_out  Receives 1 or 0.
+ * @retval SKEP_ERR_ARGUMENT  No such task.
+ */
+skep_status skep_job_is_done(const struct skep_job *job,
+                             uint32_t task,
+                             uint32_t cycle,
+                             uint32_t view,
+                             int32_t *done_out);
 
 #ifdef __cplusplus
 } /* extern "C" */

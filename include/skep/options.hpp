@@ -14,6 +14,10 @@
 //       Worker threads at most; 0 takes one for each core. At most four for each core are started, and no
 //       more than the images keep busy. The result does not depend on it.
 //       whole number, 0 to 4096, threads; default: 0
+//   memory
+//       Bytes of memory that a run in a folder keeps to; 0 takes three quarters of what the machine or its
+//       control group allows. The result does not depend on it.
+//       whole number, 0 to 9007199254740992, bytes; default: 0
 //   simd
 //       Instruction set: scalar, baseline, v3, or best for the best the machine has; the result does not
 //       depend on it.
@@ -200,6 +204,10 @@
 //       Fill small gaps from the surrounding planes after the last cycle, where the source views confirm
 //       them.
 //       switch, true or false; default: true, paper: false
+//   refine.max_speckle_size
+//       Largest number of pixels of a speckle after the last cycle: an island of validated planes that no
+//       surface around it continues. Speckles lose their validation; 0 keeps them.
+//       whole number, at least 0, pixels; default: 30, paper: 0
 //
 // Fusion: which pixels become points (section 6 of the paper).
 //   fusion.depth_tolerance

@@ -58,11 +58,15 @@ pub fn overlaps(centers: &[DVec3], points: &[SparsePoint]) -> Vec<Vec<u32>> {
     overlaps
 }
 
-/// The views with the most common points, at most [`MAX_CHOSEN`]; of equally many those with the nearest cameras,
-/// then those of lower numbers.
+/// The views with the most common points, at most [`MAX_CHOSEN`]: of about equally many, within a power of two as
+/// long tracks are counted in part, those with the nearest cameras, then those of lower numbers.
 fn most_common(centers: &[DVec3], view: usize, mut others: Vec<(u32, u32)>) -> impl Iterator<Item = u32> {
     let distance = |other: u32| centers[other as usize].distance_squared(centers[view]);
-    others.sort_by(|a, b| b.1.cmp(&a.1).then(distance(a.0).total_cmp(&distance(b.0))).then(a.0.cmp(&b.0)));
+    let magnitude = |count: u32| count.checked_ilog2();
+    others.sort_by(|a, b| {
+        let by_count = magnitude(b.1).cmp(&magnitude(a.1));
+        by_count.then(distance(a.0).total_cmp(&distance(b.0))).then(a.0.cmp(&b.0))
+    });
     others.into_iter().take(MAX_CHOSEN).map(|(other, _)| other)
 }
 

@@ -129,16 +129,15 @@ impl Estimates {
         Ok(found)
     }
 
-    /// Removes what no task reads once all tasks of the cycle before are done: its searched estimates, and
-    /// all of the cycles before that.
-    pub(super) fn remove_before(&self, cycle: usize, previous: Option<usize>) {
-        self.searched.forget(|&(of, _)| of < cycle);
-        self.checked.forget(|&(of, _)| Some(of) < previous);
-        self.upsampled.forget(|&(of, _)| of < cycle);
+    /// Removes what no task reads once all views are checked in a cycle: all but its checked estimates.
+    pub(super) fn remove_before_check(&self, cycle: usize) {
+        self.searched.forget(|&(of, _)| of <= cycle);
+        self.checked.forget(|&(of, _)| of < cycle);
+        self.upsampled.forget(|&(of, _)| of <= cycle);
         for entry in std::fs::read_dir(self.folder.estimates()).into_iter().flatten().flatten() {
             let name = entry.file_name();
             let Some((of, stage)) = name.to_str().and_then(parse_name) else { continue };
-            if of < cycle && (stage == "searched" || Some(of) < previous) {
+            if of < cycle || of == cycle && stage == "searched" {
                 let _ = std::fs::remove_file(entry.path());
             }
         }

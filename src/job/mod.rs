@@ -231,7 +231,12 @@ impl Job {
             Task::Fuse => self.fuse(progress)?,
         };
         let paths: Vec<&Path> = files.iter().map(|path| path.as_path()).collect();
-        Record::new(&self.folder, self.run, &paths, content)?.write(&self.folder.record(task))
+        Record::new(&self.folder, self.run, &paths, content)?.write(&self.folder.record(task))?;
+        if let Task::Next { cycle } = task {
+            // Only now: a process that is killed in between must find what it needs to decide again.
+            self.estimates.remove_before_check(cycle);
+        }
+        Ok(())
     }
 
     fn record(&self, task: Task) -> Option<Record> {
@@ -293,7 +298,6 @@ impl Job {
 
     fn search(&self, cycle: usize, view: usize, progress: ProgressFn) -> Result<(Content, Vec<PathBuf>)> {
         let before = self.cycle_before(cycle)?;
-        self.estimates.remove_before(cycle, before);
         let read = self.views_read_by(view);
         let load = |&other: &usize| match before {
             Some(before) => self

@@ -58,6 +58,10 @@ class Options(Mapping[str, Value]):
     """Worker threads at most; 0 takes one for each core. At most four for each core are started, and no more
     than the images keep busy. The result does not depend on it. (whole number, 0 to 4096, threads; default:
     0)"""
+    memory: int
+    """Bytes of memory that a run in a folder keeps to; 0 takes three quarters of what the machine or its
+    control group allows. The result does not depend on it. (whole number, 0 to 9007199254740992, bytes;
+    default: 0)"""
     simd: str
     """Instruction set: scalar, baseline, v3, or best for the best the machine has; the result does not depend
     on it. (name; default: best)"""
@@ -202,6 +206,10 @@ class Options(Mapping[str, Value]):
     refine_fill_gaps: bool
     """Fill small gaps from the surrounding planes after the last cycle, where the source views confirm them.
     (switch, true or false; default: true, paper: false)"""
+    refine_max_speckle_size: int
+    """Largest number of pixels of a speckle after the last cycle: an island of validated planes that no
+    surface around it continues. Speckles lose their validation; 0 keeps them. (whole number, at least 0,
+    pixels; default: 30, paper: 0)"""
     fusion_depth_tolerance: float
     """Largest relative depth difference of pixels that are fused. (number, 0 to 1, fraction of the depth;
     default: 0.01)"""
