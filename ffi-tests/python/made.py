@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import skep
@@ -135,3 +136,18 @@ def slow_options() -> skep.Options:
     return skep.Options(
         "paper", schedule_scales="downscale=1 food_sources=64 iterations=10000+0x0", threads=2
     )
+
+
+def scene_folder(folder: Path) -> Path:
+    """The scene with exact points as files."""
+    made = scene()
+    made.add_points(*points())
+    made.write_colmap(folder)
+    return folder
+
+
+def results(folder: Path) -> dict[str, bytes]:
+    """The files of a run that its tasks write."""
+    found = {str(path.relative_to(folder)): path for path in folder.rglob("*") if path.is_file()}
+    ours = {name: path for name, path in found.items() if not name.startswith(("run/", "report.json"))}
+    return {name: path.read_bytes() for name, path in ours.items()}

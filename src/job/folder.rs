@@ -69,8 +69,9 @@ impl RunFolder {
     /// A folder that cannot be written; another process that works on the run.
     pub(super) fn lock(&self, access: Access) -> Result<File> {
         let path = self.0.join("run").join("lock");
+        // NFS gives a shared lock only on a file that is open for reading, an exclusive one for writing.
         let open = std::fs::create_dir_all(self.0.join("run"))
-            .and_then(|()| File::options().create(true).truncate(false).write(true).open(&path));
+            .and_then(|()| File::options().create(true).truncate(false).read(true).write(true).open(&path));
         let file = open.map_err(|error| cannot_be_written(&path, error))?;
         let locked = match access {
             Access::Whole => file.try_lock(),

@@ -232,9 +232,11 @@ impl Job {
         };
         let paths: Vec<&Path> = files.iter().map(|path| path.as_path()).collect();
         Record::new(&self.folder, self.run, &paths, content)?.write(&self.folder.record(task))?;
-        if let Task::Next { cycle } = task {
-            // Only now: a process that is killed in between must find what it needs to decide again.
-            self.estimates.remove_before_check(cycle);
+        // Only now: a process that is killed in between must find what it needs to do the task again.
+        match task {
+            Task::Next { cycle } => self.estimates.remove_before_check(cycle),
+            Task::Fuse => self.estimates.remove_all(),
+            _ => (),
         }
         Ok(())
     }

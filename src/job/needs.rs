@@ -20,9 +20,12 @@ const SEARCH_BYTES: u64 = 130;
 const IMAGE_BYTES: u64 = 2;
 /// Bytes of a scene for each pixel of a view while its photograph is decoded.
 const DECODE_BYTES: u64 = 12;
-/// Bytes of a view's maps and previews on disk for each pixel, and of its estimates of two stages.
-const MAP_BYTES: u64 = 60;
-const ESTIMATE_BYTES: u64 = 52;
+/// Bytes of a view's maps, previews and points on disk for each pixel; 98 to 112 on photographs, by the size of
+/// the view sets.
+const MAP_BYTES: u64 = 115;
+/// Bytes of a view's checked estimate for each pixel, which stays until the cloud is written. Before there are
+/// maps the estimates take 70: of the cycle before, searched and checked.
+const ESTIMATE_BYTES: u64 = 22;
 /// CPU seconds for each unit of work and source view; measured on one core of a server with AVX2.
 const SECONDS_PER_UNIT: f64 = 1.9e-7;
 
@@ -99,10 +102,11 @@ pub(super) fn needs(
     let threads = thread_count(scene, options);
     let pixels: u64 = scene.views().iter().map(|view| view.camera.pixels() as u64).sum();
     let task = largest_task(scene, stepper, readers);
-    // One bit of each pixel tells the fusion what is part of a point already.
     let observations: u64 = scene.points().iter().map(|point| 48 + 4 * point.views.len() as u64).sum();
-    let base = BASE + observations + pixels / 8;
-    let fusion = fusion_bytes(scene, overlaps);
+    let base = BASE + observations;
+    // One bit of each pixel tells the fusion what is part of a point already. Not part of the base: of many
+    // views it is more than another task takes.
+    let fusion = fusion_bytes(scene, overlaps) + pixels / 8;
     let least_memory = base + task.max(fusion);
     let memory = budget(options);
     if memory < least_memory {

@@ -61,6 +61,7 @@ fn the_tasks_one_by_one_give_the_same_bits_and_may_be_repeated() {
         }
     }
     assert!(results(&output) == results(run.path()));
+    assert!(!run.path().join("run/estimates").exists(), "no task needs them any more");
 }
 
 #[test]

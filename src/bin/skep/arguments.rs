@@ -96,6 +96,12 @@ pub struct Reconstruct {
 pub struct Plan {
     #[command(flatten)]
     pub run: Run,
+    /// Write the tasks as a template of Open Job Description instead of printing them
+    #[arg(long, value_name = "FILE")]
+    pub openjd: Option<PathBuf>,
+    /// Write a script that submits the tasks to Slurm instead of printing them
+    #[arg(long, value_name = "FILE")]
+    pub slurm: Option<PathBuf>,
 }
 
 /// A planned run and how to work on it.
@@ -344,7 +350,11 @@ a line at the same time if it likes, on machines that share the folder of the ru
   skep fuse RUN                                 after all views are finished
 
 A task that is done, or of a cycle that the run skips, succeeds at once: tasks may be repeated.
-`skep plan` prints the tasks, with the files that each range of views reads.";
+`skep plan` prints the tasks, with the views whose files each range of views reads, or writes them for a
+scheduler:
+
+  skep plan SCENE -o RUN --openjd RUN/job.json     for schedulers that read Open Job Description
+  skep plan SCENE -o RUN --slurm RUN/submit.sh     then: bash RUN/submit.sh --cpus-per-task=8 --mem=16G";
 
 const FUSE_HELP: &str = "\
 The workspace is what `skep reconstruct` or `colmap patch_match_stereo` writes: stereo/depth_maps and

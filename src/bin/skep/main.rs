@@ -5,6 +5,7 @@ mod dump;
 mod fuse;
 mod info;
 mod interrupt;
+mod plan_files;
 mod progress;
 mod reconstruct;
 mod report;

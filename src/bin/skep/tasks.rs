@@ -4,49 +4,27 @@ use crate::arguments::{FinishViews, NextCycle, Plan, Planned, Views};
 use crate::interrupt::Interrupt;
 use crate::progress::Display;
 use crate::reconstruct;
-use crate::{Failure, streams};
+use crate::{Failure, plan_files, streams};
 use skep::job::{Job, Task};
 use skep::{Error, Progress};
 use std::ops::Range;
 
-/// Views of a task in the list of `skep plan`.
-const VIEWS_PER_TASK: usize = 16;
-
-/// `skep plan`: prepares the folder and prints the tasks.
+/// `skep plan`: prepares the folder, and prints the tasks or writes them to the files that were asked for.
 pub fn plan(arguments: &Plan) -> Result<(), Failure> {
     let run = &arguments.run;
     let job = reconstruct::plan(run, Display::new(run.quiet))?;
-    if !run.quiet {
-        task_list(&job, &run.output().display().to_string()).iter().for_each(|line| streams::result(line));
+    let folder = run.output();
+    if let Some(file) = &arguments.openjd {
+        plan_files::write_openjd(&job, &folder, file)?;
+    }
+    if let Some(file) = &arguments.slurm {
+        plan_files::write_slurm(&job, &folder, file)?;
+    }
+    if !run.quiet && arguments.openjd.is_none() && arguments.slurm.is_none() {
+        let lines = plan_files::command_lines(&job, &folder.display().to_string());
+        lines.iter().for_each(|line| streams::result(line));
     }
     Ok(())
-}
-
-/// The commands of all tasks, with what each range of views reads.
-fn task_list(job: &Job, folder: &str) -> Vec<String> {
-    let views = job.scene().views().len();
-    let ranges = || (0..views).step_by(VIEWS_PER_TASK).map(|start| start..views.min(start + VIEWS_PER_TASK));
-    let text = |range: &Range<usize>| format!("{}..{}", range.start, range.end);
-    let mut lines = vec!["# views read, besides their own, by the tasks of a range of views".to_owned()];
-    for range in ranges() {
-        let mut read: Vec<usize> = range.clone().flat_map(|view| job.views_read_by(view)).collect();
-        read.sort_unstable();
-        read.dedup();
-        read.retain(|view| !range.contains(view));
-        let read: Vec<String> = read.iter().map(usize::to_string).collect();
-        lines.push(format!("# {}: {}", text(&range), read.join(" ")));
-    }
-    for cycle in 0..job.stepper().cycles().len() {
-        for command in ["search", "check"] {
-            let of_range =
-                |range| format!("skep {command} {folder} --cycle {cycle} --views {}", text(&range));
-            lines.extend(ranges().map(of_range));
-        }
-        lines.push(format!("skep next {folder} --cycle {cycle}"));
-    }
-    lines.extend(ranges().map(|range| format!("skep finish {folder} --views {}", text(&range))));
-    lines.push(format!("skep fuse {folder}"));
-    lines
 }
 
 /// `skep search`

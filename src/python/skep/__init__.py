@@ -9,8 +9,8 @@ From calibrated photographs to depth, normal and source-view maps and a fused po
     depth, points = result[0].depth, result.cloud.positions
 
 There are four levels, which can be mixed: whole runs (`reconstruct`), runs in a folder that may be larger
-than memory and go on after an interruption (`Job`), the stages of a run on single views (`Stepper`), and
-kernels (`plane_homographies`, `patch_ncc`).
+than memory and go on after an interruption (`Job`; on a cluster of Dask `skep.distributed`), the stages of a
+run on single views (`Stepper`), and kernels (`plane_homographies`, `patch_ncc`).
 
 Conventions: x_cam = R x_world + t with x right, y down, z forward; depth is z; the center of the
 top-left pixel is (0, 0). Input arrays are copied, or read only during the call. The same input, options
