@@ -48,27 +48,27 @@ static int32_t stop_early(void *user, const skep_progress *progress) {
 /* What a second process does: it goes on with the run that the first one cancelled. */
 static int go_on(const char *place, const char *folder, const skep_options *options) {
     skep_job *job = NULL;
-    uint64_t points = 0;
+    uint64_t count = 0;
     const int done = skep_job_plan(place, 0, 0, options, folder, 0, &job) == SKEP_OK &&
-                     skep_job_run(job, NULL, NULL, &points) == SKEP_OK;
+                     skep_job_run(job, NULL, NULL, &count) == SKEP_OK;
     skep_job_destroy(job);
-    return done && points > 0 ? 0 : 1;
+    return done && count > 0 ? 0 : 1;
 }
 
 static void check_resumption(const char *place, const char *folder, skep_options *options) {
     skep_job *job = NULL;
     skep_job_needs needs;
-    REQUIRE(skep_job_plan(place, 0, 0, options, folder, 0, &job));
+    REQUIRE(skep_job_plan(place, 0, 0, options, folder, 1, &job));
     REQUIRE(skep_job_get_needs(job, &needs));
     CHECK(needs.least_memory > 0 && needs.memory >= needs.least_memory && needs.disk > 0 &&
               needs.cpu_seconds > 0,
           "%llu", (unsigned long long)needs.least_memory);
     skep_job_destroy(job);
 
-    REQUIRE(skep_options_set_number(options, "memory", 1e6));
+    REQUIRE(skep_options_set(options, "memory", 1e6));
     FAILS(skep_job_plan(place, 0, 0, options, folder, 0, OUT(skep_job *, 0)), SKEP_ERR_ARGUMENT,
           "options.memory is");
-    REQUIRE(skep_options_set_number(options, "memory", (double)needs.least_memory));
+    REQUIRE(skep_options_set(options, "memory", (double)needs.least_memory));
     REQUIRE(skep_job_plan(place, 0, 0, options, folder, 0, &job));
     FAILS(skep_job_plan(place, 0, 0, options, folder, 0, OUT(skep_job *, 0)), SKEP_ERR_FILE,
           "another process works on the run");

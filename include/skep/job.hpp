@@ -4,6 +4,7 @@
 
 #include "options.hpp"
 #include "result.hpp"
+#include "scene.hpp"
 
 namespace skep {
 inline namespace SKEP_FLAVOR {
@@ -17,23 +18,17 @@ enum class Task : std::uint32_t {
     Fuse = SKEP_TASK_FUSE
 };
 
-/// The range of depths of every view; as it is, the ranges are derived from the sparse points.
-struct DepthRange {
-    double near_end = 0;
-    double far_end = 0;
-};
-
 /// A run in a folder.
 class Job : public detail::Handle<skep_job, skep_job_destroy> {
   public:
     using Handle::Handle;
     /// Plans the run of a COLMAP scene, or goes on with the one in the folder.
     static Fallible<Job> plan(const std::string &scene, const std::string &folder,
-                              OptionsOrDefault options = {}, DepthRange range = {},
+                              OptionsOrDefault options = {}, DepthRange range = {0, 0},
                               bool fresh = false) {
         Job job;
         detail::Status status = options.check().then([&] {
-            return skep_job_plan(scene.c_str(), range.near_end, range.far_end, options.get(),
+            return skep_job_plan(scene.c_str(), range.near_depth, range.far_depth, options.get(),
                                  folder.c_str(), fresh, job.put());
         });
         return detail::give(std::move(status), job);

@@ -69,6 +69,7 @@ impl Job {
     /// # Errors
     /// The errors of [`Job::run_task`]. What is done stays done.
     pub fn run_tasks(&self, tasks: &[Task], progress: ProgressFn) -> Result<()> {
+        tasks.iter().try_for_each(|&task| self.check_task(task))?;
         let meter = Meter::new(progress, tasks.len() as u64);
         JoinedPool::new(thread_count(&self.scene, &self.options))?
             .install(|| self.run_counted(tasks.iter().map(|&task| (task, 1)).collect(), &meter))

@@ -291,8 +291,9 @@ skep_options *quick_options(void) {
     REQUIRE(skep_options_set(options, "few_views", 0));
     REQUIRE(skep_options_set(options, "check.reprojection_tolerance", 0));
     if (scene_is_small()) {
-        /* All of it is edge. */
+        /* All of it is edge, and a surface is as small as a speckle. */
         REQUIRE(skep_options_set(options, "fattening_passes", 0));
+        REQUIRE(skep_options_set(options, "max_speckle_size", 0));
     }
     return options;
 }
