@@ -7,7 +7,8 @@ use crate::image::Picture;
 use crate::io::{MapKind, Workspace, read_depth_map};
 use crate::memory::Cache;
 use crate::scene::{Maps, Scene};
-use std::sync::Arc;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The finished views of a run.
 pub(super) struct FinishedViews<'a> {
@@ -16,6 +17,8 @@ pub(super) struct FinishedViews<'a> {
     /// The views that may see the same surface as a view.
     pub overlaps: &'a [Vec<u32>],
     kept: Cache<usize, Finished>,
+    /// The views of the last group, which the next one has mostly in common.
+    last: Mutex<HashMap<usize, Arc<Finished>>>,
 }
 
 /// A view in memory.
@@ -36,7 +39,7 @@ impl<'a> FinishedViews<'a> {
         overlaps: &'a [Vec<u32>],
         limit: usize,
     ) -> FinishedViews<'a> {
-        FinishedViews { scene, workspace, overlaps, kept: Cache::new(limit) }
+        FinishedViews { scene, workspace, overlaps, kept: Cache::new(limit), last: Mutex::default() }
     }
 
     fn load(&self, index: usize) -> Result<Arc<Finished>> {
@@ -67,9 +70,17 @@ impl FusionInput for FinishedViews<'_> {
     }
 
     fn with_views(&self, views: &[u32], body: &mut dyn FnMut(&[FusionView]) -> Result<()>) -> Result<()> {
-        let loaded: Vec<_> = views.iter().map(|&view| self.load(view as usize)).collect::<Result<_>>()?;
-        let view = |(&view, finished): (&u32, &'_ Arc<Finished>)| (view as usize, Arc::clone(finished));
-        let loaded: Vec<_> = views.iter().zip(&loaded).map(view).collect();
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        // Others are dropped before any is loaded: one group at a time is in memory, besides the cache.
+        last.retain(|view, _| views.contains(&(*view as u32)));
+        for &view in views {
+            let view = view as usize;
+            if !last.contains_key(&view) {
+                last.insert(view, self.load(view)?);
+            }
+        }
+        let loaded: Vec<(usize, Arc<Finished>)> =
+            views.iter().map(|&view| (view as usize, last[&(view as usize)].clone())).collect();
         let group: Vec<FusionView> = loaded
             .iter()
             .map(|(view, finished)| FusionView {
