@@ -8,6 +8,7 @@ use crate::io::{MapKind, Workspace, read_depth_map};
 use crate::memory::Cache;
 use crate::scene::{Maps, Scene};
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// The finished views of a run.
@@ -75,8 +76,8 @@ impl FusionInput for FinishedViews<'_> {
         last.retain(|view, _| views.contains(&(*view as u32)));
         for &view in views {
             let view = view as usize;
-            if !last.contains_key(&view) {
-                last.insert(view, self.load(view)?);
+            if let Entry::Vacant(place) = last.entry(view) {
+                place.insert(self.load(view)?);
             }
         }
         let loaded: Vec<(usize, Arc<Finished>)> =
