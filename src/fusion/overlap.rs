@@ -8,9 +8,10 @@ use glam::DVec3;
 const MAX_CHOSEN: usize = 24;
 
 /// For each view those that are compared with it, ascending: those that saw a sparse point together with it, of
-/// more than 24 the ones with the most common points, and the views that choose it in this way. A view that saw none with any other may see the surfaces of all others, and so overlaps all of them,
-/// and they overlap it: the overlap of two views is mutual, so that a surface gives the same points whichever
-/// of them is the reference first.
+/// more than 24 the ones with the most common points, and the views that choose it in this way. A view that saw
+/// none with any other may see the surfaces of all others, and so overlaps all of them, and they overlap it: the
+/// overlap of two views is mutual, so that a surface gives the same points whichever of them is the reference
+/// first.
 ///
 /// `centers` are the camera centers of all views; a point's views must be below their number. In a scene of
 /// more than 1,000 views a view without common points overlaps the 256 views with the nearest cameras. Of

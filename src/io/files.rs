@@ -61,7 +61,7 @@ pub(crate) fn cannot_be_written(path: &Path, error: impl std::fmt::Display) -> E
 }
 
 /// Whether the files of a view of this name lie inside their folder.
-pub(super) fn stays_inside(name: &str) -> bool {
+pub(crate) fn stays_inside(name: &str) -> bool {
     let is_below = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
     !name.is_empty() && is_below && !name.contains(char::is_control)
 }

@@ -80,19 +80,18 @@ impl FusionInput for FinishedViews<'_> {
                 place.insert(self.load(view)?);
             }
         }
-        let loaded: Vec<(usize, Arc<Finished>)> =
-            views.iter().map(|&view| (view as usize, last[&(view as usize)].clone())).collect();
-        let group: Vec<FusionView> = loaded
-            .iter()
-            .map(|(view, finished)| FusionView {
-                camera: self.camera(*view),
+        let view = |&view: &u32| {
+            let (view, finished) = (view as usize, &last[&(view as usize)]);
+            FusionView {
+                camera: self.camera(view),
                 maps: &finished.maps,
                 status: None,
                 confidence: Some(&finished.confidence),
                 picture: Some(&finished.picture),
-                overlap: self.overlap(*view),
-            })
-            .collect();
+                overlap: self.overlap(view),
+            }
+        };
+        let group: Vec<FusionView> = views.iter().map(view).collect();
         body(&group)
     }
 }

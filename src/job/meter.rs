@@ -26,6 +26,11 @@ impl<'a> Meter<'a> {
         self.done.fetch_add((units as f64 * STEPS) as u64, Ordering::Relaxed);
     }
 
+    /// Counts all work up to here, if more than is counted.
+    pub(super) fn reach(&self, units: u64) {
+        self.done.fetch_max((units as f64 * STEPS) as u64, Ordering::Relaxed);
+    }
+
     /// A task of this work.
     pub(super) fn task(&self, units: u64) -> TaskMeter<'_> {
         TaskMeter { meter: self, units: units as f64, counted: AtomicU64::new(0) }

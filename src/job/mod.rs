@@ -268,7 +268,11 @@ impl Job {
         loop {
             let last = decided[decided.len() - 1];
             match self.record(Task::Next { cycle: last }).map(|record| record.content) {
-                Some(Content::Next(Some(next))) if next > last => decided.push(next),
+                Some(Content::Next(Some(next)))
+                    if (last + 1..self.stepper.cycles().len()).contains(&next) =>
+                {
+                    decided.push(next);
+                }
                 Some(Content::Next(None)) => return (decided, true),
                 _ => return (decided, false),
             }

@@ -53,6 +53,11 @@ pub(super) fn read(folder: &SceneFolder, depth_range: Option<DepthRange>, option
 pub(super) fn read_planned(folder: &RunFolder, manifest: &Manifest, options: &Options) -> Result<Scene> {
     let own = SceneFolder::find(folder.root())?;
     let model = ColmapModel::read(&own.sparse)?;
+    let names = model.images.iter().map(|image| &image.name);
+    if !names.eq(manifest.photographs.iter().map(|entry| &entry.name)) {
+        let problem = "lists other photographs than the model has; plan the run again";
+        return Err(Error::file(folder.manifest(), problem));
+    }
     let found = Manifest::new(&model, manifest.photographs.clone(), manifest.depth_range(), options);
     let differences = found.differences(manifest);
     if differences.is_empty() {
@@ -94,8 +99,7 @@ pub(super) fn prepare(
     fresh: bool,
 ) -> Result<Vec<String>> {
     let mut notices = Vec::new();
-    let is_own = folder.manifest().is_file() || folder.report().is_file();
-    if !is_own {
+    if !folder.manifest().is_file() {
         refuse_other_scene(folder, source)?;
     }
     let earlier = match Manifest::read(&folder.manifest()) {
@@ -144,11 +148,8 @@ pub(super) fn remove_run(folder: &RunFolder) -> Result<()> {
         remove(&path)?;
     }
     for entry in std::fs::read_dir(folder.tasks()).into_iter().flatten().flatten() {
-        if let Ok(record) = std::fs::read(entry.path())
-            && let Ok(record) = serde_json::from_slice::<Record>(&record)
-        {
-            record.remove_files(folder);
-        }
+        let record = std::fs::read(entry.path()).ok().and_then(|bytes| Record::parse(&bytes));
+        record.iter().for_each(|record| record.remove_files(folder));
     }
     for path in [folder.tasks(), folder.estimates()] {
         match std::fs::remove_dir_all(&path) {

@@ -91,8 +91,14 @@ impl Job {
         let work_before = |cycle: usize| SEARCH_UNITS * self.stepper.work_before(cycle) + checks(cycle);
         let total = work_before(cycles.len()) + (FINISH_UNITS + FUSE_UNITS) * pixels;
         let meter = Meter::new(progress, total);
-        let mut next = Some(0);
-        while let Some(cycle) = next {
+        loop {
+            // Cycles that are decided are done: their estimates may be gone.
+            let (decided, is_all) = self.decided_cycles();
+            let cycle = decided[decided.len() - 1];
+            meter.reach(if is_all { work_before(cycles.len()) } else { work_before(cycle) });
+            if is_all {
+                break;
+            }
             let pixels_of = |view: usize| {
                 let (width, height) = self.stepper.size(cycle, view).unwrap_or_default();
                 u64::from(width) * u64::from(height)
@@ -102,16 +108,8 @@ impl Job {
             self.run_counted((0..self.stepper.views()).map(search).collect(), &meter)?;
             let check = |view| (Task::Check { cycle, view }, CHECK_UNITS * pixels_of(view));
             self.run_counted((0..self.stepper.views()).map(check).collect(), &meter)?;
-            if !self.is_done(Task::Next { cycle }) {
-                after_cycle(cycle)?;
-                self.run_task(Task::Next { cycle }, progress)?;
-            }
-            next = match self.record(Task::Next { cycle }).map(|record| record.content) {
-                Some(Content::Next(next)) => next,
-                _ => None,
-            };
-            let following = next.unwrap_or(cycles.len());
-            meter.skip(work_before(following) - work_before(cycle + 1));
+            after_cycle(cycle)?;
+            self.run_task(Task::Next { cycle }, progress)?;
         }
         let of_view = |view: usize| self.scene.views()[view].camera.pixels() as u64;
         let finish = |view| (Task::Finish { view }, FINISH_UNITS * of_view(view));

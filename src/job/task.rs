@@ -4,11 +4,13 @@ use super::fingerprint::{Fingerprint, fingerprint_file, text};
 use super::folder::RunFolder;
 use crate::ambc::Counts;
 use crate::error::{Error, Result};
-use crate::io::write_file;
+use crate::io::{stays_inside, write_file};
 use crate::pipeline::CycleRecord;
 use crate::scene::PixelStatus;
 use serde::{Deserialize, Serialize};
+use std::io::Write;
 use std::path::Path;
+use xxhash_rust::xxh3::xxh3_64;
 
 /// A part of a run. What a task reads is on disk once the tasks it depends on are done.
 ///
@@ -122,13 +124,24 @@ impl Record {
 
     /// Reads the record of a task; `None` where there is none of this run.
     pub(super) fn read(folder: &RunFolder, run: u64, task: Task) -> Option<Record> {
-        let bytes = std::fs::read(folder.record(task)).ok()?;
-        let record: Record = serde_json::from_slice(&bytes).ok()?;
+        let record = Record::parse(&std::fs::read(folder.record(task)).ok()?)?;
         (record.run == text(run)).then_some(record)
     }
 
+    /// The record in the bytes of a file: a line of JSON, and the XXH3 of that line. `None` for anything else,
+    /// and where a path leads out of the run's folder: files are removed by these paths.
+    pub(super) fn parse(bytes: &[u8]) -> Option<Record> {
+        let (line, hash) = std::str::from_utf8(bytes).ok()?.split_once('\n')?;
+        let record: Record = serde_json::from_str(line).ok()?;
+        let is_whole = hash == text(xxh3_64(line.as_bytes()));
+        (is_whole && record.files.iter().all(|file| stays_inside(&file.path))).then_some(record)
+    }
+
     pub(super) fn write(&self, path: &Path) -> Result<()> {
-        write_file(path, |out| Ok(serde_json::to_writer(out, self)?))
+        write_file(path, |out| {
+            let line = serde_json::to_string(self)?;
+            write!(out, "{line}\n{}", text(xxh3_64(line.as_bytes())))
+        })
     }
 
     /// What is wrong with the files of the task; reads all of them.
@@ -155,6 +168,40 @@ impl Record {
         for file in &self.files {
             // What cannot be removed is replaced later.
             let _ = std::fs::remove_file(folder.root().join(&file.path));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::fingerprint::fingerprint;
+
+    fn bytes_of(path: &str) -> Vec<u8> {
+        let files = vec![FileEntry { path: path.to_owned(), content: fingerprint(b"content") }];
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("record.json");
+        Record { run: text(7), files, content: Content::Next(Some(3)) }.write(&file).unwrap();
+        std::fs::read(file).unwrap()
+    }
+
+    #[test]
+    fn a_record_is_read_as_it_was_written_and_not_if_any_bit_differs() {
+        let bytes = bytes_of("stereo/depth_maps/left/1.jpg.geometric.bin");
+        assert_eq!(Record::parse(&bytes).unwrap().content, Content::Next(Some(3)));
+        for bit in 0..8 * bytes.len() {
+            let mut damaged = bytes.clone();
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            assert_eq!(Record::parse(&damaged), None, "bit {bit}");
+        }
+        assert_eq!(Record::parse(&bytes[..bytes.len() - 1]), None);
+        assert_eq!(Record::parse(b""), None);
+    }
+
+    #[test]
+    fn a_record_of_files_outside_of_the_folder_is_none() {
+        for path in ["/etc/passwd", "../other/fused.ply", "stereo/../../x", "", "a\0b"] {
+            assert_eq!(Record::parse(&bytes_of(path)), None, "{path}");
         }
     }
 }

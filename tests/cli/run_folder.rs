@@ -82,6 +82,10 @@ fn a_task_before_its_inputs_is_refused_and_names_what_is_missing() {
     refused(&["search", "--cycle", "99"], "below their number");
     refused(&["search", "--cycle", "0", "--views", "5..8"], "views of 0..7");
     refused(&["search", "--cycle", "0", "--views", "3..3"], "A..B");
+    let manifest = run.path().join("run/manifest.json");
+    let renamed = fs::read_to_string(&manifest).unwrap().replace("key.jpg", "source9.jpg");
+    fs::write(&manifest, renamed).unwrap();
+    refused(&["search", "--cycle", "0"], "other photographs than the model has");
     let elsewhere = scene.path().to_str().unwrap();
     let (_, printed) = failure(&["search", elsewhere, "--cycle", "0"]);
     assert!(printed.contains("manifest.json") && printed.contains("skep plan"), "{printed}");
