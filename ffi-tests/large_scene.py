@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Makes a scene of any number of views of any size from the board in examples/data, for measurements of time and
-memory: its photographs are enlarged and repeated, each repetition with slightly moved poses, so that the work is
-that of real photographs while the result means nothing.
+"""Makes a scene of any number of views of any size from the board in examples/data, for measurements of time
+and memory: its photographs are enlarged and repeated, each repetition with slightly moved poses, so that the
+work is that of real photographs while the result means nothing.
 
     large_scene.py FOLDER --views 256 --size 1600x900
 
