@@ -2199,8 +2199,8 @@ skep_status skep_read_consistency_graph(const char *file,
 
 /*
  * A run is a set of tasks. skep_job_run does all of them; a host with a scheduler of its own calls
- * skep_job_run_task in this order, those of a line at the same time if it likes, each process with a job that
- * skep_job_open gave:
+ * skep_job_run_task in this order, those of a line at the same time if it likes, each process with a job
+ * that skep_job_open gave:
  *
  *   for each cycle, from 0:  SKEP_TASK_SEARCH of every view
  *                            SKEP_TASK_CHECK of every view
@@ -2261,8 +2261,8 @@ typedef struct skep_job_needs {
 
 /**
  * Plans the run of a COLMAP scene in a folder, which is created. A run of the same photographs, model,
- * options and version that began there goes on; anything else begins anew, and skep_job_get_notice tells why.
- * The options "threads", "memory" and "simd" may change. No other process can work on the run while the job
+ * options and version that began there goes on; anything else begins anew, and skep_job_get_notice tells
+ * why. The options "threads", "memory" and "simd" may change. No other process can work on the run while the job
  * exists.
  *
  * @param scene            Path of the folder with images/ and a COLMAP model in sparse/ or sparse/0/.
@@ -2293,8 +2293,8 @@ skep_status skep_job_plan(const char *scene,
  *                         with. NULL: the default preset.
  * @param job_out          Receives the job; destroy it with skep_job_destroy.
  * @retval SKEP_ERR_ARGUMENT  Less memory than the run needs.
- * @retval SKEP_ERR_FILE      No run of this version; a model that changed; another process that plans or does
- *                            the whole run.
+ * @retval SKEP_ERR_FILE      No run of this version; a model that changed; another process that plans or
+ *                            does the whole run.
  */
 skep_status skep_job_open(const char *folder,
                           const struct skep_options *options_or_null,

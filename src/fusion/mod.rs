@@ -318,9 +318,9 @@ impl<'a> Reference<'a> {
         Some((place, depth, start))
     }
 
-    /// The points that start in a row; `gains` are the factors of the colors of each view. `used` tells by view
-    /// and pixel whether it is part of a point: while one view is the reference, its own flags are only read
-    /// and those of the others only set, so that the order of the threads does not matter.
+    /// The points that start in a row; `gains` are the factors of the colors of each view. `used` tells by
+    /// view and pixel whether it is part of a point: while one view is the reference, its own flags are only
+    /// read and those of the others only set, so that the order of the threads does not matter.
     fn fuse_row(&self, row: u32, used: &[Used], gains: &[DVec3]) -> PointCloud {
         let view = &self.group[0];
         let first = row as usize * view.camera.width as usize;
