@@ -49,7 +49,7 @@ static int32_t stop_early(void *user, const skep_progress *progress) {
 static int go_on(const char *place, const char *folder, const skep_options *options) {
     skep_job *job = NULL;
     uint64_t count = 0;
-    const int done = skep_job_plan(place, 0, 0, options, folder, 0, &job) == SKEP_OK &&
+    const int done = skep_job_plan(place, 0, 0, options, folder, 0, NULL, NULL, &job) == SKEP_OK &&
                      skep_job_run(job, NULL, NULL, &count) == SKEP_OK;
     skep_job_destroy(job);
     return done && count > 0 ? 0 : 1;
@@ -58,7 +58,7 @@ static int go_on(const char *place, const char *folder, const skep_options *opti
 static void check_resumption(const char *place, const char *folder, skep_options *options) {
     skep_job *job = NULL;
     skep_job_needs needs;
-    REQUIRE(skep_job_plan(place, 0, 0, options, folder, 1, &job));
+    REQUIRE(skep_job_plan(place, 0, 0, options, folder, 1, NULL, NULL, &job));
     REQUIRE(skep_job_get_needs(job, &needs));
     CHECK(needs.least_memory > 0 && needs.memory >= needs.least_memory && needs.disk > 0 &&
               needs.cpu_seconds > 0,
@@ -66,11 +66,11 @@ static void check_resumption(const char *place, const char *folder, skep_options
     skep_job_destroy(job);
 
     REQUIRE(skep_options_set(options, "memory", 1e6));
-    FAILS(skep_job_plan(place, 0, 0, options, folder, 0, OUT(skep_job *, 0)), SKEP_ERR_ARGUMENT,
+    FAILS(skep_job_plan(place, 0, 0, options, folder, 0, NULL, NULL, OUT(skep_job *, 0)), SKEP_ERR_ARGUMENT,
           "options.memory is");
     REQUIRE(skep_options_set(options, "memory", (double)needs.least_memory));
-    REQUIRE(skep_job_plan(place, 0, 0, options, folder, 0, &job));
-    FAILS(skep_job_plan(place, 0, 0, options, folder, 0, OUT(skep_job *, 0)), SKEP_ERR_FILE,
+    REQUIRE(skep_job_plan(place, 0, 0, options, folder, 0, NULL, NULL, &job));
+    FAILS(skep_job_plan(place, 0, 0, options, folder, 0, NULL, NULL, OUT(skep_job *, 0)), SKEP_ERR_FILE,
           "another process works on the run");
     double done = 0;
     FAILS(skep_job_run(job, stop_early, &done, OUT(uint64_t, 0)), SKEP_ERR_CANCELLED, "cancelled");
@@ -92,7 +92,7 @@ static void check_tasks(const char *place, const char *folder, const skep_option
     skep_job *job = NULL;
     uint32_t cycles = 0, views = 0, read[MAX_VIEWS];
     size_t count = 0;
-    REQUIRE(skep_job_plan(place, 0, 0, options, folder, 1, &job));
+    REQUIRE(skep_job_plan(place, 0, 0, options, folder, 1, NULL, NULL, &job));
     REQUIRE(skep_job_get_count(job, &cycles, &views));
     REQUIRE(skep_job_get_views_read(job, 0, read, MAX_VIEWS, &count));
     CHECK(cycles > 1 && count > 1 && count <= views && read[0] == 0, "%zu", count);
@@ -130,10 +130,10 @@ static void check_tasks(const char *place, const char *folder, const skep_option
 
 static void check_misuse(const char *place, const char *folder) {
     skep_job *job = NULL;
-    FAILS(skep_job_plan(NULL, 0, 0, NULL, folder, 0, &job), SKEP_ERR_NULL, "scene");
-    FAILS(skep_job_plan(place, 0, 0, NULL, NULL, 0, &job), SKEP_ERR_NULL, "folder");
-    FAILS(skep_job_plan(place, 0, 0, NULL, folder, 0, NULL), SKEP_ERR_NULL, "job_out");
-    FAILS(skep_job_plan(place, 2, 1, NULL, folder, 0, &job), SKEP_ERR_ARGUMENT, "depth range");
+    FAILS(skep_job_plan(NULL, 0, 0, NULL, folder, 0, NULL, NULL, &job), SKEP_ERR_NULL, "scene");
+    FAILS(skep_job_plan(place, 0, 0, NULL, NULL, 0, NULL, NULL, &job), SKEP_ERR_NULL, "folder");
+    FAILS(skep_job_plan(place, 0, 0, NULL, folder, 0, NULL, NULL, NULL), SKEP_ERR_NULL, "job_out");
+    FAILS(skep_job_plan(place, 2, 1, NULL, folder, 0, NULL, NULL, &job), SKEP_ERR_ARGUMENT, "depth range");
     FAILS(skep_job_open(place, NULL, &job), SKEP_ERR_FILE, "manifest.json");
     FAILS(skep_job_open(NULL, NULL, &job), SKEP_ERR_NULL, "folder");
     FAILS(skep_job_run(NULL, NULL, NULL, NULL), SKEP_ERR_NULL, "job");

@@ -25,11 +25,13 @@ class Job : public detail::Handle<skep_job, skep_job_destroy> {
     /// Plans the run of a COLMAP scene, or goes on with the one in the folder.
     static Fallible<Job> plan(const std::string &scene, const std::string &folder,
                               OptionsOrDefault options = {}, DepthRange range = {0, 0},
-                              bool fresh = false) {
+                              bool fresh = false, const ProgressCallback &progress = {}) {
         Job job;
         detail::Status status = options.check().then([&] {
-            return skep_job_plan(scene.c_str(), range.near_depth, range.far_depth, options.get(),
-                                 folder.c_str(), fresh, job.put());
+            return progress.run([&](skep_progress_fn callback, void *user) {
+                return skep_job_plan(scene.c_str(), range.near_depth, range.far_depth, options.get(),
+                                     folder.c_str(), fresh, callback, user, job.put());
+            });
         });
         return detail::give(std::move(status), job);
     }

@@ -64,11 +64,14 @@ pub struct skep_job_needs {
 /// @param options_or_null  The options, copied; NULL: the default preset.
 /// @param folder           Path of the folder of the run.
 /// @param fresh            Non-zero begins anew in any case.
+/// @param progress_or_null  Receives the progress of reading the photographs and may cancel; NULL: none.
+/// @param user             Passed to the callback; may be NULL.
 /// @param job_out          Receives the job; destroy it with skep_job_destroy.
 /// @retval SKEP_ERR_ARGUMENT  Options or depths out of range, less memory than the run needs, or a scene that
 ///                            skep_scene_validate refuses.
 /// @retval SKEP_ERR_FILE      A file that is missing or damaged; a folder that cannot be written, holds
 ///                            another scene, or in which another process works.
+/// @retval SKEP_ERR_CANCELLED  The callback returned non-zero; an earlier run in the folder is as it was.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_job_plan(
     scene: *const c_char,
@@ -77,6 +80,8 @@ pub unsafe extern "C" fn skep_job_plan(
     options_or_null: *const skep_options,
     folder: *const c_char,
     fresh: i32,
+    progress_or_null: skep_progress_fn,
+    user: *mut c_void,
     job_out: *mut *mut skep_job,
 ) -> skep_status {
     guard(|| {
@@ -93,7 +98,9 @@ pub unsafe extern "C" fn skep_job_plan(
         if let Some(range) = range {
             range.check("depth range")?;
         }
-        out.give(skep_job { job: Job::plan(scene, range, &options, folder, fresh != 0)? });
+        let host = Host::new(progress_or_null, user);
+        let job = Job::plan(scene, range, &options, folder, fresh != 0, &|at| host.tell(at))?;
+        out.give(skep_job { job });
         Ok(())
     })
 }

@@ -13,6 +13,8 @@ pub const SKEP_PHASE_SEARCH: u32 = 0;
 pub const SKEP_PHASE_CHECK: u32 = 1;
 /// Fusion of maps into points.
 pub const SKEP_PHASE_FUSION: u32 = 2;
+/// Reading of photographs.
+pub const SKEP_PHASE_READ: u32 = 3;
 
 /// Progress of a call.
 #[repr(C)]
@@ -74,6 +76,7 @@ impl Host {
             let progress = skep_progress {
                 done: at.done,
                 phase: match at.phase {
+                    Phase::Read => SKEP_PHASE_READ,
                     Phase::Search => SKEP_PHASE_SEARCH,
                     Phase::Check => SKEP_PHASE_CHECK,
                     Phase::Fusion => SKEP_PHASE_FUSION,

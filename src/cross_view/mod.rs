@@ -11,5 +11,5 @@ mod tolerance;
 pub(crate) use averaging::average;
 pub(crate) use confidence::confidence;
 pub(crate) use consistency::ConsistencyCheck;
-pub(crate) use propagation::{Donor, Target, candidates};
+pub(crate) use propagation::{CandidateCollector, Donor, Target};
 pub(crate) use tolerance::{DepthTolerance, widening};

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 #[derive(Clone, Copy)]
 pub(crate) struct Donor<'a> {
     /// Its index in the scene: of candidates of equal cost that of the lowest view is taken.
-    pub view: usize,
+    pub view: u32,
     /// Its camera on this scale.
     pub camera: &'a Camera,
     /// Its checked planes.
@@ -34,41 +34,58 @@ pub(crate) struct Target<'a> {
 /// Pixels that one thread takes at once; `advance` is told before each block.
 const BLOCK: usize = 1 << 13;
 
-/// The candidates of the pixels of a target view, depth 0 where there is none: for each pixel that is not
-/// validated, of all donors' planes that project there and are consistent with at least one of their source
-/// views, the one of lowest cost. The order of the donors does not matter.
-///
-/// # Errors
-/// What `advance` returns.
-pub(crate) fn candidates(target: &Target, donors: &[Donor], advance: Advance) -> Result<Vec<Candidate>> {
-    let blocks: Vec<(&Donor, usize)> = (donors.iter())
-        .flat_map(|donor| (0..donor.planes.len()).step_by(BLOCK).map(move |first| (donor, first)))
-        .collect();
-    let lists = blocks.into_par_iter().map(|(donor, first)| {
-        advance(0)?;
-        Ok(propagated(target, donor, first))
-    });
-    let lists: Vec<Vec<(usize, Ranked)>> = lists.collect::<Result<_>>()?;
-    let mut best = vec![Candidate::default(); target.camera.pixels()];
-    best.par_chunks_mut(BLOCK).enumerate().for_each(|(block, best)| {
-        let first = block * BLOCK;
-        let mut ranked = vec![Ranked::default(); best.len()];
-        for list in &lists {
-            let here = &list[list.partition_point(|(pixel, _)| *pixel < first)..];
-            for (pixel, candidate) in here.iter().take_while(|(pixel, _)| *pixel < first + best.len()) {
-                ranked[pixel - first].keep_better(candidate);
+/// The candidates of the pixels of a target view: for each pixel that is not validated, of all donors' planes
+/// that project there and are consistent with at least one of their source views, the one of lowest cost. The
+/// donors are added one after another; their order does not matter.
+pub(crate) struct CandidateCollector<'a> {
+    target: Target<'a>,
+    /// The best so far of every pixel; empty before the first donor.
+    best: Vec<Ranked>,
+}
+
+impl<'a> CandidateCollector<'a> {
+    /// No candidates yet.
+    pub(crate) fn new(target: Target<'a>) -> CandidateCollector<'a> {
+        CandidateCollector { target, best: Vec::new() }
+    }
+
+    /// Adds the candidates from the planes of a donor.
+    ///
+    /// # Errors
+    /// What `advance` returns.
+    pub(crate) fn add(&mut self, donor: &Donor, advance: Advance) -> Result<()> {
+        let starts: Vec<usize> = (0..donor.planes.len()).step_by(BLOCK).collect();
+        let target = &self.target;
+        let lists = starts.into_par_iter().map(|first| {
+            advance(0)?;
+            Ok(propagated(target, donor, first))
+        });
+        let lists: Vec<Vec<(usize, Ranked)>> = lists.collect::<Result<_>>()?;
+        self.best.resize(target.camera.pixels(), Ranked::default());
+        self.best.par_chunks_mut(BLOCK).enumerate().for_each(|(block, best)| {
+            let (first, end) = (block * BLOCK, block * BLOCK + best.len());
+            for list in &lists {
+                let here = &list[list.partition_point(|(pixel, _)| *pixel < first)..];
+                for (pixel, candidate) in here.iter().take_while(|(pixel, _)| *pixel < end) {
+                    best[pixel - first].keep_better(candidate);
+                }
             }
-        }
-        best.iter_mut().zip(ranked).for_each(|(best, ranked)| *best = ranked.candidate);
-    });
-    Ok(best)
+        });
+        Ok(())
+    }
+
+    /// The pixels with a candidate, ascending.
+    pub(crate) fn into_candidates(self) -> Vec<(u32, Candidate)> {
+        let candidates = (0u32..).zip(self.best).map(|(pixel, ranked)| (pixel, ranked.candidate));
+        candidates.filter(|(_, candidate)| candidate.depth > 0.0).collect()
+    }
 }
 
 /// A candidate and the view it comes from.
 #[derive(Debug, Clone, Copy, Default)]
 struct Ranked {
     candidate: Candidate,
-    view: usize,
+    view: u32,
 }
 
 impl Ranked {
@@ -157,12 +174,14 @@ mod tests {
         target: &PlaneMap,
         donors: &[(usize, &PlaneMap)],
     ) -> Vec<Candidate> {
-        let donors: Vec<Donor> = (donors.iter())
-            .map(|&(view, map)| Donor { view, camera: &world.cameras[view], planes: &map.planes })
-            .collect();
         let target = Target { camera: &world.cameras[0], planes: &target.planes, range };
-        let found = candidates(&target, &donors, &|_| Ok(())).unwrap();
-        assert_eq!(found.len(), target.planes.len());
+        let mut collector = CandidateCollector::new(target);
+        for &(view, map) in donors {
+            let donor = Donor { view: view as u32, camera: &world.cameras[view], planes: &map.planes };
+            collector.add(&donor, &|_| Ok(())).unwrap();
+        }
+        let mut found = vec![Candidate::default(); target.planes.len()];
+        collector.into_candidates().into_iter().for_each(|(pixel, one)| found[pixel as usize] = one);
         found
     }
 

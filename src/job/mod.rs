@@ -25,8 +25,8 @@ use crate::fusion::{fuse_input, overlaps};
 use crate::geometry::DepthRange;
 use crate::io::{CloudWriter, ColmapModel, SceneFolder, Workspace, visibility_path};
 use crate::options::Options;
-use crate::parallel::{JoinedPool, Phase, Progress, ProgressFn, useful_threads};
-use crate::pipeline::{Checked, CycleRecord, EstimateRef, Stepper, ViewEstimate, thread_count};
+use crate::parallel::{JoinedPool, ProgressFn, useful_threads};
+use crate::pipeline::{Checked, CheckedEstimates, CycleRecord, Stepper, ViewEstimate, thread_count};
 use crate::scene::Scene;
 use estimates::Estimates;
 use folder::{Access, RunFolder};
@@ -38,7 +38,6 @@ use needs::Shares;
 pub use run::Summary;
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use task::{Content, Record};
 pub use task::{Task, ViewSummary};
 
@@ -49,7 +48,8 @@ pub use task::{Task, ViewSummary};
 /// use skep::job::Job;
 /// use skep::{Options, ignore_progress};
 ///
-/// let job = Job::plan("SCENE".as_ref(), None, &Options::default(), "SCENE/dense".as_ref(), false)?;
+/// let (scene, folder) = ("SCENE".as_ref(), "SCENE/dense".as_ref());
+/// let job = Job::plan(scene, None, &Options::default(), folder, false, &ignore_progress)?;
 /// println!("{:.0} CPU seconds", job.needs().cpu_seconds);
 /// let summary = job.run(&ignore_progress)?;
 /// println!("{} points", summary.points);
@@ -63,8 +63,6 @@ pub struct Job {
     stepper: Stepper,
     run: u64,
     estimates: Estimates,
-    /// By view, the views that have it among their sources.
-    readers: Vec<Vec<u32>>,
     /// By view, the views that the fusion compares it with.
     overlaps: Vec<Vec<u32>>,
     needs: Needs,
@@ -82,13 +80,15 @@ impl Job {
     ///
     /// # Errors
     /// An option out of its range; less memory than the run needs; a file that is missing or damaged; a folder
-    /// that cannot be written, holds another scene, or in which another process works.
+    /// that cannot be written, holds another scene, or in which another process works; [`Error::Cancelled`].
+    /// An earlier run in the folder is then as it was.
     pub fn plan(
         scene: &Path,
         depth_range: Option<DepthRange>,
         options: &Options,
         folder: &Path,
         fresh: bool,
+        progress: ProgressFn,
     ) -> Result<Job> {
         options.check()?;
         let source = SceneFolder::find(scene)?;
@@ -96,9 +96,10 @@ impl Job {
         let lock = folder.lock(Access::Whole)?;
         // How much work there is is known from the scene alone.
         let pool = JoinedPool::new(useful_threads(options.threads, usize::MAX))?;
-        let plan = pool.install(|| plan::read(&source, depth_range, options))?;
+        let plan = pool.install(|| plan::read(&source, depth_range, options, progress))?;
         let run = plan.manifest.run();
         let mut job = pool.install(|| Job::new(folder, plan.scene, options, run, lock))?;
+        job.needs.require(job.needs.least_memory)?;
         // Last: a run that cannot begin leaves the folder as it was.
         job.notices = plan::prepare(&job.folder, &source, &job.scene, &plan.manifest, fresh)?;
         Ok(job)
@@ -109,8 +110,8 @@ impl Job {
     /// `others`.
     ///
     /// # Errors
-    /// A folder without a run of this version; a model that changed; less memory than the run needs; another
-    /// process that plans or does the whole run.
+    /// A folder without a run of this version; a model that changed; another process that plans or does the
+    /// whole run.
     pub fn open(folder: &Path, others: &Options) -> Result<Job> {
         let folder = RunFolder::new(folder);
         let path = folder.manifest();
@@ -128,13 +129,9 @@ impl Job {
     fn new(folder: RunFolder, scene: Scene, options: &Options, run: u64, lock: File) -> Result<Job> {
         // The first stepper knows the source views, from which the limit of the images follows.
         let planned = Stepper::with_image_limit(&scene, options, 0)?;
-        let mut readers = vec![Vec::new(); scene.views().len()];
-        for view in 0..scene.views().len() {
-            planned.sources(view).iter().for_each(|&source| readers[source as usize].push(view as u32));
-        }
         let centers: Vec<DVec3> = scene.views().iter().map(|view| view.camera.center()).collect();
         let overlaps = overlaps(&centers, scene.points());
-        let (needs, shares) = needs::needs(&scene, options, &planned, &readers, &overlaps)?;
+        let (needs, shares) = needs::needs(&scene, options, &planned, &overlaps);
         let estimates = Estimates::new(&folder, run, shares.estimates);
         Ok(Job {
             workspace: Workspace::new(folder.root()),
@@ -144,7 +141,6 @@ impl Job {
             scene,
             run,
             estimates,
-            readers,
             overlaps,
             needs,
             shares,
@@ -176,7 +172,7 @@ impl Job {
     /// The views whose files the tasks of a view read, ascending: its own, its sources, and those whose source
     /// it is.
     pub fn views_read_by(&self, view: usize) -> Vec<usize> {
-        let sources = self.stepper.sources(view).iter().chain(&self.readers[view]);
+        let sources = self.stepper.sources(view).iter().chain(self.stepper.readers(view));
         let mut read: Vec<usize> = sources.map(|&other| other as usize).chain([view]).collect();
         read.sort_unstable();
         read.dedup();
@@ -197,9 +193,10 @@ impl Job {
     ///
     /// # Errors
     /// An estimate that is not there, not yet or not anymore; a damaged file.
-    pub fn checked(&self, cycle: usize, view: usize) -> Result<Arc<ViewEstimate<Checked>>> {
+    pub fn checked(&self, cycle: usize, view: usize) -> Result<ViewEstimate<Checked>> {
         self.check_task(Task::Check { cycle, view })?;
-        self.estimates.checked(&self.stepper, cycle, view)
+        let planes = self.estimates.planes(&self.stepper, cycle, view)?;
+        Ok(self.stepper.publish(ViewEstimate::clone(&planes)))
     }
 
     /// Whether all tasks are done.
@@ -216,13 +213,18 @@ impl Job {
     /// depends on must be done.
     ///
     /// # Errors
-    /// A view or cycle that does not exist; a task that it depends on and that is not done; a file that is
-    /// damaged or cannot be written; [`Error::Cancelled`].
+    /// A view or cycle that does not exist; a task that it depends on and that is not done; less memory than
+    /// the task needs; a file that is damaged or cannot be written; [`Error::Cancelled`].
     pub fn run_task(&self, task: Task, progress: ProgressFn) -> Result<()> {
         self.check_task(task)?;
         if self.is_done(task) {
             return Ok(());
         }
+        self.needs.require(match task {
+            Task::Next { .. } => 0,
+            Task::Fuse => self.shares.least.fusion,
+            _ => self.shares.least.views,
+        })?;
         let (content, files) = match task {
             Task::Search { cycle, view } => self.search(cycle, view, progress)?,
             Task::Check { cycle, view } => self.check(cycle, view, progress)?,
@@ -304,53 +306,26 @@ impl Job {
 
     fn search(&self, cycle: usize, view: usize, progress: ProgressFn) -> Result<(Content, Vec<PathBuf>)> {
         let before = self.cycle_before(cycle)?;
-        let read = self.views_read_by(view);
-        let load = |&other: &usize| match before {
-            Some(before) => self
-                .estimates
-                .checked_for(&self.stepper, (before, other), cycle)
-                .map(|found| Some((other, found))),
-            None => Ok(None),
-        };
-        let loaded: Vec<_> = read.iter().map(load).collect::<Result<_>>()?;
-        let mut estimates = vec![None; self.stepper.views()];
-        for (other, found) in loaded.iter().flatten() {
-            estimates[*other] = Some(&**found);
-        }
-        let candidates = self.stepper.propagate(cycle, view, &estimates)?;
-        let found = self.stepper.search(cycle, view, &estimates, Some(&candidates), progress)?;
+        let checked = before.map(|before| self.estimates.checked(&self.stepper, before, cycle));
+        let checked = checked.as_ref().map(|checked| checked as &dyn CheckedEstimates);
+        let found = self.stepper.search_streamed(cycle, view, checked, progress)?;
         Ok((Content::Search, vec![self.estimates.put_searched(found)?]))
     }
 
     fn check(&self, cycle: usize, view: usize, progress: ProgressFn) -> Result<(Content, Vec<PathBuf>)> {
         self.cycle_before(cycle)?;
-        let (at, views) = (self.stepper.cycles()[cycle], self.stepper.views());
-        let (phase, downscale) = (Phase::Check, at.scale.downscale);
-        if progress(&Progress { phase, downscale, cycle: at.cycle, view, views, done: 0.0 }).is_break() {
-            return Err(Error::Cancelled);
-        }
         for &other in self.stepper.sources(view).iter().chain(&[view as u32]) {
             if self.record(Task::Search { cycle, view: other as usize }).is_none() {
                 let value = format!("{cycle}, before the search of view {other} is done");
                 return Err(Error::argument("cycle", value, "a cycle whose views are all searched"));
             }
         }
-        let load = |&source: &u32| {
-            self.estimates
-                .searched(&self.stepper, cycle, source as usize)
-                .map(|found| (source as usize, found))
-        };
-        let loaded: Vec<_> = self.stepper.sources(view).iter().map(load).collect::<Result<_>>()?;
-        let mut sources = vec![None; self.stepper.views()];
-        for (source, found) in &loaded {
-            sources[*source] = Some(EstimateRef::Searched(found));
-        }
-        let own = self.estimates.searched(&self.stepper, cycle, view)?;
-        let checked = self.stepper.check(&own, &sources)?;
+        let searched = |view| self.estimates.searched(&self.stepper, cycle, view);
+        let checked = self.stepper.check_streamed(cycle, view, &searched, progress)?;
         let record = checked.cycles().last().copied();
         let record =
             record.ok_or_else(|| Error::argument("estimate", "one without a cycle", "a searched one"))?;
-        Ok((Content::Check(record), vec![self.estimates.put_checked(checked)?]))
+        Ok((Content::Check(record), self.estimates.put_checked(checked)?))
     }
 
     fn decide_next(&self, cycle: usize) -> Result<Option<usize>> {
@@ -377,16 +352,8 @@ impl Job {
             ));
         };
         let last = decided[decided.len() - 1];
-        let read =
-            std::iter::once(view).chain(self.stepper.sources(view).iter().map(|&source| source as usize));
-        let load =
-            |other: usize| self.estimates.checked(&self.stepper, last, other).map(|found| (other, found));
-        let loaded: Vec<_> = read.map(load).collect::<Result<_>>()?;
-        let mut estimates = vec![None; self.stepper.views()];
-        for (other, found) in &loaded {
-            estimates[*other] = Some(&**found);
-        }
-        let result = self.stepper.finish(view, &estimates, progress)?;
+        let checked = self.estimates.checked(&self.stepper, last, last);
+        let result = self.stepper.finish_streamed(view, &checked, progress)?;
         let own = &self.scene.views()[view];
         self.workspace.write_view(&own.name, &own.camera, &result)?;
         let summary = ViewSummary {
@@ -404,6 +371,7 @@ impl Job {
                 return Err(Error::argument("fuse", value, "a run whose views are all finished"));
             }
         }
+        self.estimates.forget();
         let limit = self.shares.fusion;
         let views = FinishedViews::new(&self.scene, &self.workspace, &self.overlaps, limit);
         let path = self.workspace.cloud();

@@ -1,6 +1,6 @@
 //! What a run needs: memory, disk and time.
 
-use super::estimates::BYTES_PER_PIXEL;
+use super::estimates::{PLANE_BYTES, SURFACE_BYTES};
 use crate::error::{Error, Result};
 use crate::memory::{available_memory, format_bytes};
 use crate::options::Options;
@@ -13,9 +13,13 @@ const DEFAULT_FRACTION: f64 = 0.75;
 const DEFAULT_MEMORY: u64 = 4 << 30;
 /// Memory of the program, its threads and allocator, before any image.
 const BASE: u64 = 192 << 20;
-/// Bytes for each pixel of a view's search besides images and estimates: the planes found, view sets,
-/// candidates, and the copy that is written.
-const SEARCH_BYTES: u64 = 130;
+/// Bytes for each pixel of a view that its search takes besides images and estimates: the planes found, view
+/// sets and candidates.
+const SEARCH_BYTES: u64 = 110;
+/// The same of its check: a copy of the estimate, verdicts and filtered planes.
+const CHECK_BYTES: u64 = 80;
+/// The same of its end: averaged and filled planes, and the maps.
+const FINISH_BYTES: u64 = 130;
 /// Bytes of a packed image for each pixel.
 const IMAGE_BYTES: u64 = 2;
 /// Bytes of a scene for each pixel of a view while its photograph is decoded.
@@ -45,6 +49,8 @@ pub struct Needs {
 /// How a run divides its memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Shares {
+    /// The least bytes with which the tasks of views work, and the fusion.
+    pub least: Least,
     /// Tasks at a time.
     pub tasks: usize,
     /// Bytes of packed images that are kept.
@@ -53,6 +59,24 @@ pub(super) struct Shares {
     pub estimates: usize,
     /// Bytes of finished views that the fusion keeps beyond those it needs.
     pub fusion: usize,
+}
+
+/// The least bytes that parts of a run need.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Least {
+    pub views: u64,
+    pub fusion: u64,
+}
+
+impl Needs {
+    /// Returns an error if the run keeps to less memory than these bytes, which a part of it needs.
+    pub(super) fn require(&self, least: u64) -> Result<()> {
+        if self.memory >= least {
+            return Ok(());
+        }
+        let expected = format!("at least {} for these photographs ({least} bytes)", format_bytes(least));
+        Err(Error::argument("options.memory", format_bytes(self.memory), expected))
+    }
 }
 
 /// The bytes that a run keeps to: those of the option, or a fraction of what is available.
@@ -72,52 +96,45 @@ fn fusion_bytes(scene: &Scene, overlaps: &[Vec<u32>]) -> u64 {
     (0..scene.views().len()).map(group).max().unwrap_or(0)
 }
 
-/// Bytes of the largest task: a view with the estimates and images of all views it reads.
-fn largest_task(scene: &Scene, stepper: &Stepper, readers: &[Vec<u32>]) -> u64 {
+/// Bytes of the largest task: a view with what it reads of other views.
+fn largest_task(scene: &Scene, stepper: &Stepper) -> u64 {
     let pixels = |view: usize| scene.views()[view].camera.pixels() as u64;
     let of_view = |view: usize| {
         let sources = stepper.sources(view);
-        let images: u64 = sources.iter().map(|&source| pixels(source as usize) * IMAGE_BYTES).sum();
-        let mut read: Vec<u32> = sources.iter().chain(&readers[view]).copied().collect();
-        read.sort_unstable();
-        read.dedup();
-        let estimates: u64 = read.iter().map(|&other| pixels(other as usize) * BYTES_PER_PIXEL as u64).sum();
-        let own = pixels(view) * (BYTES_PER_PIXEL as u64 + IMAGE_BYTES + SEARCH_BYTES + DECODE_BYTES);
-        images + estimates + own
+        let of_sources: u64 = sources.iter().map(|&source| pixels(source as usize)).sum();
+        let set_bytes = 4 * (sources.len() as u64).div_ceil(32).max(1);
+        // Donors are read one after another, and released before the search.
+        let donor = stepper.readers(view).iter().map(|&donor| pixels(donor as usize)).max().unwrap_or(0);
+        let search = of_sources * SURFACE_BYTES + (donor * PLANE_BYTES).max(pixels(view) * SEARCH_BYTES);
+        let check = of_sources * (PLANE_BYTES + set_bytes) + pixels(view) * (CHECK_BYTES + set_bytes);
+        let finish = of_sources * (SURFACE_BYTES + PLANE_BYTES) + pixels(view) * FINISH_BYTES;
+        let images = of_sources * IMAGE_BYTES + pixels(view) * (IMAGE_BYTES + DECODE_BYTES);
+        images + pixels(view) * (PLANE_BYTES + set_bytes) + search.max(check).max(finish)
     };
     (0..scene.views().len()).map(of_view).max().unwrap_or(0)
 }
 
-/// What a run needs, and how it divides its memory among `threads` threads.
-///
-/// # Errors
-/// A budget below the least with which the run works.
+/// What a run needs, and how it divides its memory.
 pub(super) fn needs(
     scene: &Scene,
     options: &Options,
     stepper: &Stepper,
-    readers: &[Vec<u32>],
     overlaps: &[Vec<u32>],
-) -> Result<(Needs, Shares)> {
+) -> (Needs, Shares) {
     let threads = thread_count(scene, options);
     let pixels: u64 = scene.views().iter().map(|view| view.camera.pixels() as u64).sum();
-    let task = largest_task(scene, stepper, readers);
+    let task = largest_task(scene, stepper);
     let observations: u64 = scene.points().iter().map(|point| 48 + 4 * point.views.len() as u64).sum();
     let base = BASE + observations;
     // One bit of each pixel tells the fusion what is part of a point already. Not part of the base: of many
     // views it is more than another task takes.
     let fusion = fusion_bytes(scene, overlaps) + pixels / 8;
-    let least_memory = base + task.max(fusion);
+    let least = Least { views: base + task, fusion: base + fusion };
     let memory = budget(options);
-    if memory < least_memory {
-        let expected =
-            format!("at least {} for these photographs ({least_memory} bytes)", format_bytes(least_memory));
-        return Err(Error::argument("options.memory", format_bytes(memory), expected));
-    }
     // As many tasks at a time as keep the threads busy, and fit.
     let wanted = 1 + (threads as u64 + 2) / 4;
-    let tasks = ((memory - base) / task.max(1)).clamp(1, wanted);
-    let rest = memory - base - tasks * task;
+    let tasks = (memory.saturating_sub(base) / task.max(1)).clamp(1, wanted);
+    let rest = memory.saturating_sub(base + tasks * task);
     let all_images: u64 = stepper
         .cycles()
         .iter()
@@ -128,10 +145,11 @@ pub(super) fn needs(
         .sum();
     let images = all_images.min(rest / 3);
     let shares = Shares {
+        least,
         tasks: tasks as usize,
         images: images as usize,
         estimates: (rest - images) as usize,
-        fusion: (memory - base - fusion) as usize,
+        fusion: memory.saturating_sub(least.fusion) as usize,
     };
     let work: f64 = (0..scene.views().len())
         .map(|view| {
@@ -143,5 +161,6 @@ pub(super) fn needs(
         })
         .sum();
     let disk = pixels * (MAP_BYTES + ESTIMATE_BYTES);
-    Ok((Needs { least_memory, memory, disk, cpu_seconds: work * SECONDS_PER_UNIT }, shares))
+    let least_memory = least.views.max(least.fusion);
+    (Needs { least_memory, memory, disk, cpu_seconds: work * SECONDS_PER_UNIT }, shares)
 }

@@ -13,6 +13,8 @@ use crate::io::{
     remove_temporary_files,
 };
 use crate::options::Options;
+use crate::parallel::{Phase, Progress, ProgressFn};
+use crate::pipeline::Tracker;
 use crate::scene::{Scene, View};
 use rayon::prelude::*;
 use std::path::Path;
@@ -27,20 +29,32 @@ pub(super) struct Plan {
 /// Reads a scene and decodes each photograph once: a damaged one is found now and not after hours.
 ///
 /// # Errors
-/// A file that is missing, damaged, or not of its camera's size.
-pub(super) fn read(folder: &SceneFolder, depth_range: Option<DepthRange>, options: &Options) -> Result<Plan> {
+/// A file that is missing, damaged, or not of its camera's size; [`Error::Cancelled`].
+pub(super) fn read(
+    folder: &SceneFolder,
+    depth_range: Option<DepthRange>,
+    options: &Options,
+    progress: ProgressFn,
+) -> Result<Plan> {
     if !folder.images.is_dir() {
         return Err(Error::file(&folder.images, "no such folder; expected the photographs in it"));
     }
     let model = ColmapModel::read(&folder.sparse)?;
-    let entry = |image: &ModelImage| {
+    let tracker = Tracker::with_work(progress, model.images.len() as u64);
+    let advance = |units, view| {
+        let (phase, views) = (Phase::Read, model.images.len());
+        tracker.advance(units, Progress { phase, downscale: 1, cycle: 0, view, views, done: 0.0 })
+    };
+    let entry = |(view, image): (usize, &ModelImage)| {
+        advance(0, view)?;
         // Checks that it exists and its size.
         let path = folder.photograph(&image.name, &image.camera)?;
         let bytes = std::fs::read(&path).map_err(|error| cannot_be_read(&path, error))?;
         picture_from_bytes(&bytes, &path)?;
+        advance(1, view)?;
         Ok(PhotographEntry { name: image.name.clone(), content: fingerprint(&bytes) })
     };
-    let photographs: Vec<_> = model.images.par_iter().with_max_len(1).map(entry).collect::<Result<_>>()?;
+    let photographs: Vec<_> = model.images.par_iter().enumerate().with_max_len(1).map(entry).collect::<Result<_>>()?;
     let manifest = Manifest::new(&model, photographs, depth_range, options);
     let scene = scene(folder, model, &manifest)?;
     Ok(Plan { scene, manifest })

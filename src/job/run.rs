@@ -27,6 +27,8 @@ const CHECK_UNITS: u64 = 7;
 const FINISH_UNITS: u64 = 10;
 const FUSE_UNITS: u64 = 5;
 
+const NOT_COMPLETE: &str = "no such record: the run is not complete";
+
 impl Job {
     /// Does all tasks that are not done, on a thread pool of its own, and returns what the run made. Files
     /// that were damaged since they were written are made again.
@@ -47,21 +49,31 @@ impl Job {
         progress: ProgressFn,
         after_cycle: &(dyn Fn(usize) -> Result<()> + Sync),
     ) -> Result<Summary> {
-        let mut warnings = self.stepper.warnings().to_vec();
+        let mut repaired = Vec::new();
         JoinedPool::new(thread_count(&self.scene, &self.options))?.install(|| {
-            warnings.extend(self.repair()?);
+            repaired = self.repair()?;
             self.run_all(progress, after_cycle)
         })?;
+        let mut summary = self.summary()?;
+        summary.warnings.extend(repaired);
+        Ok(summary)
+    }
+
+    /// What a complete run made.
+    ///
+    /// # Errors
+    /// A run that is not complete.
+    pub fn summary(&self) -> Result<Summary> {
         let summary = |view| match self.record(Task::Finish { view }).map(|record| record.content) {
             Some(Content::Finish(summary)) => Ok(summary),
-            _ => Err(Error::file(self.folder.record(Task::Finish { view }), "removed during the run")),
+            _ => Err(Error::file(self.folder.record(Task::Finish { view }), NOT_COMPLETE)),
         };
         let views = (0..self.stepper.views()).map(summary).collect::<Result<_>>()?;
         let points = match self.record(Task::Fuse).map(|record| record.content) {
             Some(Content::Fuse(points)) => points,
-            _ => return Err(Error::file(self.folder.record(Task::Fuse), "removed during the run")),
+            _ => return Err(Error::file(self.folder.record(Task::Fuse), NOT_COMPLETE)),
         };
-        Ok(Summary { views, points, warnings })
+        Ok(Summary { views, points, warnings: self.stepper.warnings().to_vec() })
     }
 
     /// Does some tasks that do not depend on each other, a few at a time, on a thread pool of its own.

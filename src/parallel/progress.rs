@@ -5,6 +5,8 @@ use std::ops::ControlFlow;
 /// Phase of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
+    /// Photographs are read.
+    Read,
     /// The planes of a view are searched.
     Search,
     /// Views are checked against each other, and finished.
@@ -17,6 +19,7 @@ impl Phase {
     /// One lower-case word.
     pub fn name(self) -> &'static str {
         match self {
+            Phase::Read => "read",
             Phase::Search => "search",
             Phase::Check => "check",
             Phase::Fusion => "fusion",

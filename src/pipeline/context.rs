@@ -3,14 +3,13 @@
 
 use super::cycle::{Cycle, CycleRecord, Place};
 use super::sources::PublishedSurfaces;
-use crate::cross_view::Donor;
 use crate::error::{Error, Result};
 use crate::image::PackedImage;
 use crate::matching::{Problem, Source, Window};
 use crate::options::{Options, Scale};
 use crate::parallel::{Advance, Phase, Progress};
 use crate::refine::FilteredView;
-use crate::scene::{ImageCache, PixelEstimate, ScaledView, Scene};
+use crate::scene::{ImageCache, ScaledView, Scene};
 use crate::simd::SimdLevel;
 use crate::view_selection::{SourceLists, source_lists};
 use rayon::prelude::*;
@@ -24,6 +23,8 @@ pub(super) struct RunContext {
     windows: Vec<Window>,
     evidence_window: Window,
     sources: SourceLists,
+    /// By view, the views that have it among their sources, ascending.
+    readers: Vec<Vec<u32>>,
     cycles: Vec<Cycle>,
     /// By scale and view.
     scaled: Vec<Vec<ScaledView>>,
@@ -62,12 +63,18 @@ impl RunContext {
         let scaled = scales.iter().map(scaled).collect();
         let photographs = scene.views().iter().map(|view| view.picture.clone()).collect();
         let downscales = scales.iter().map(|scale| scale.downscale).collect();
+        let sources = source_lists(scene, options);
+        let mut readers = vec![Vec::new(); scene.views().len()];
+        for (view, list) in (0u32..).zip(&sources.lists) {
+            list.iter().for_each(|&source| readers[source as usize].push(view));
+        }
         Ok(RunContext {
             options: options.clone(),
             level: options.simd.unwrap_or_else(SimdLevel::detect),
             windows: (0..scales.len()).map(|scale| window(options, scale)).collect(),
             evidence_window: evidence_window(options),
-            sources: source_lists(scene, options),
+            sources,
+            readers,
             cycles: Cycle::all(options),
             scaled,
             images: ImageCache::new(photographs, downscales, limit),
@@ -94,6 +101,11 @@ impl RunContext {
     /// The source views of a view, which its view sets index.
     pub(super) fn sources(&self, view: usize) -> &[u32] {
         &self.sources.lists[view]
+    }
+
+    /// The views that have a view among their sources, ascending.
+    pub(super) fn readers(&self, view: usize) -> &[u32] {
+        &self.readers[view]
     }
 
     /// Warnings about the selection of source views, as sentences.
@@ -156,20 +168,6 @@ impl RunContext {
             problem.sources.push(Source::new(camera, other, image, surface));
         }
         problem
-    }
-
-    /// The views that have a view among their sources, with their checked planes where these are known.
-    pub(super) fn donors<'b>(
-        &'b self,
-        at: Place,
-        planes: impl Fn(usize) -> Option<&'b [PixelEstimate]>,
-    ) -> Vec<Donor<'b>> {
-        let has_view = |donor: &usize| self.sources(*donor).contains(&(at.view as u32));
-        let donor = |view| {
-            let camera = &self.scaled(Place { view, ..at }).camera;
-            planes(view).map(|planes| Donor { view, camera, planes })
-        };
-        (0..self.views()).filter(has_view).filter_map(donor).collect()
     }
 
     /// The cycle after this one, whose records these are; `None` after the last. From its second cycle on,

@@ -32,9 +32,9 @@ pub struct Searched {
     pub(super) view_sets: ViewSets,
 }
 
-/// Checked, not filtered and published yet.
+/// Checked; its surface is not published yet, or kept apart.
 #[derive(Debug, Clone)]
-pub(super) struct Unpublished;
+pub(crate) struct CheckedPlanes;
 
 /// Checked in a cycle, filtered and published: has the verdicts, and the validated surface that other views
 /// read.
@@ -73,7 +73,22 @@ pub struct OwnMaps<'a> {
     pub cost: Option<&'a [f32]>,
 }
 
+/// What the stages read of a view's own estimate: all but its surface, which other views read.
+#[derive(Clone, Copy)]
+pub(super) struct OwnEstimate<'a> {
+    /// One for each pixel.
+    pub planes: &'a [PixelEstimate],
+    /// Work done for the view so far.
+    pub counts: Counts,
+    /// The cycles of the view so far.
+    pub cycles: &'a [CycleRecord],
+}
+
 impl<S> ViewEstimate<S> {
+    pub(super) fn as_own(&self) -> OwnEstimate<'_> {
+        OwnEstimate { planes: self.planes(), counts: self.counts, cycles: &self.cycles }
+    }
+
     /// The view.
     pub fn view(&self) -> usize {
         self.at.view
@@ -140,6 +155,13 @@ impl ViewEstimate<Checked> {
     /// validates it.
     pub fn verdicts(&self) -> impl ExactSizeIterator<Item = (u8, bool)> + '_ {
         self.map.planes.iter().map(|plane| (plane.consistent_views, plane.validated))
+    }
+
+    /// The planes and the surface apart.
+    #[cfg(feature = "io")]
+    pub(crate) fn without_surface(self) -> (ViewEstimate<CheckedPlanes>, Vec<CompactPlane>) {
+        let (planes, Checked { surface }) = self.into_stage(CheckedPlanes);
+        (planes, surface)
     }
 
     pub(super) fn surface(&self) -> &[CompactPlane] {

@@ -16,6 +16,9 @@ mod stages;
 mod status;
 mod stepper;
 mod store;
+#[cfg(feature = "io")]
+mod streamed;
+mod view_tasks;
 
 use crate::error::Result;
 use crate::options::Options;
@@ -24,13 +27,19 @@ use crate::scene::Scene;
 use context::RunContext;
 pub(crate) use cycle::Place;
 pub use cycle::{Cycle, CycleRecord};
+#[cfg(feature = "io")]
+pub(crate) use estimate::CheckedPlanes;
 pub use estimate::{AnyEstimate, Checked, EstimateRef, OwnMaps, Searched, ViewEstimate};
-use progress::Tracker;
+pub(crate) use progress::Tracker;
 pub use result::{Reconstruction, ViewResult};
+#[cfg(feature = "io")]
+pub(crate) use serialize::ReadEstimate;
 pub use stages::Candidates;
-use stages::SearchInput;
+use stages::{Propagation, SearchInput};
 pub use stepper::Stepper;
 use store::Store;
+#[cfg(feature = "io")]
+pub(crate) use streamed::CheckedEstimates;
 
 /// Estimates depth, normal and view set of every pixel of every view, and fuses the validated ones into
 /// points.
@@ -84,12 +93,18 @@ fn run_cycle(
     let searching = |view, units| tracker.advance(units, context.progress(Phase::Search, at(view)));
     let checking = |view, units| tracker.advance(units, context.progress(Phase::Check, at(view)));
 
-    let previous = previous.map(|view, own| stages::upsample(context, at(view), own))?;
+    let upsample = |view, own| stages::upsample(context, at(view), own);
+    let previous = previous.map(|view, own: Option<_>| Ok(own.map(|own| upsample(view, own))))?;
 
     // Reads the checked planes of the views that have this one among their sources.
     let candidates = previous.map_ref(|view, own| {
-        let donors = context.donors(at(view), |donor| previous.planes(donor));
-        stages::propagate(context, at(view), own.as_ref(), &donors, &|units| searching(view, units))
+        let own = own.as_ref().map(ViewEstimate::as_own);
+        let mut propagation = Propagation::new(context, at(view), own);
+        for &donor in propagation.donors() {
+            let planes = previous.planes(donor as usize).unwrap_or_default();
+            propagation.add(donor as usize, planes, &|units| searching(view, units))?;
+        }
+        Ok(propagation.finish())
     })?;
 
     // Reads the surfaces that the sources published. A view's own planes are freed as soon as it is searched.
@@ -97,11 +112,11 @@ fn run_cycle(
     let searched = previous.zip(candidates).map(|view, (own, candidates)| {
         let images = context.images(at(view))?;
         let problem = context.problem(at(view), &images, surfaces.of_sources(context.sources(view)));
-        let input =
-            SearchInput { own: own.as_ref(), candidates: Some(&candidates), is_guided: own.is_some() };
+        let own = own.as_ref().map(ViewEstimate::as_own);
+        let input = SearchInput { own, candidates: Some(&candidates), is_guided: own.is_some() };
         let found = stages::search(context, at(view), &problem, input, &|units| searching(view, units))?;
         let found = stages::fill_textureless(context, &problem, found);
-        Ok(stages::record_search(context, own.as_ref(), found))
+        Ok(stages::record_search(context, own, found))
     })?;
     drop(surfaces);
 
@@ -137,7 +152,7 @@ fn finish(
         let images = context.images(at(view))?;
         let surfaces = estimates.surfaces_of_sources(context.sources(view));
         let problem = context.problem(at(view), &images, surfaces);
-        let averaged = stages::average_across_views(context, &problem, own);
+        let averaged = stages::average_across_views(context, &problem, own.as_own());
         let filled = stages::fill_gaps(context, at(view), &images.own, &averaged);
         let sources = estimates.planes_of_sources(context.sources(view));
         stages::recheck(context, &problem, filled, sources, &|units| advance(view, units))
@@ -149,10 +164,12 @@ fn finish(
     let results = estimates.zip(filled).map(|view, (own, filled)| {
         let images = context.images(at(view))?;
         let problem = context.problem(at(view), &images, surfaces.of_sources(context.sources(view)));
-        let mut planes = stages::average_across_views(context, &problem, &own);
+        let mut planes = stages::average_across_views(context, &problem, own.as_own());
         filled.write_to(&mut planes);
         stages::remove_speckles(context, at(view), &images.own, &mut planes);
-        stages::classify(context, &problem, own, planes, &filled, &|units| advance(view, units))
+        stages::classify(context, at(view), &problem, own.as_own(), planes, &filled, &|units| {
+            advance(view, units)
+        })
     })?;
     Ok(results.into_vec())
 }

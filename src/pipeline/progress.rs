@@ -16,7 +16,7 @@ pub(super) fn start(scene: &Scene) -> Progress {
 const FUSION_SHARE: f64 = 0.03;
 
 /// Counts the work of a call and reports it to the host.
-pub(super) struct Tracker<'a> {
+pub(crate) struct Tracker<'a> {
     progress: ProgressFn<'a>,
     /// Units of work of the call before fusion.
     total: f64,
@@ -33,7 +33,7 @@ impl<'a> Tracker<'a> {
     }
 
     /// A tracker of a call with this number of units of work.
-    pub(super) fn with_work(progress: ProgressFn<'a>, units: u64) -> Tracker<'a> {
+    pub(crate) fn with_work(progress: ProgressFn<'a>, units: u64) -> Tracker<'a> {
         let (done, cancelled) = (AtomicU64::new(0), AtomicBool::new(false));
         Tracker { progress, total: units.max(1) as f64, share: 1.0, done, cancelled }
     }
@@ -47,7 +47,7 @@ impl<'a> Tracker<'a> {
     ///
     /// # Errors
     /// [`Error::Cancelled`] after the host has cancelled.
-    pub(super) fn advance(&self, units: u64, at: Progress) -> Result<()> {
+    pub(crate) fn advance(&self, units: u64, at: Progress) -> Result<()> {
         let done = self.done.fetch_add(units, Ordering::Relaxed) + units;
         self.report(&Progress { done: self.share * (done as f64 / self.total).min(1.0), ..at })
     }

@@ -24,6 +24,12 @@ impl<'a, S> SourcePlanes<'a, S> {
         SourcePlanes { planes: sources.iter().map(of_source).collect(), stage: PhantomData }
     }
 
+    /// These planes, by source.
+    #[cfg(feature = "io")]
+    pub(super) fn of(planes: Vec<&'a [PixelEstimate]>) -> SourcePlanes<'a, S> {
+        SourcePlanes { planes, stage: PhantomData }
+    }
+
     /// By source.
     pub(super) fn into_vec(self) -> Vec<&'a [PixelEstimate]> {
         self.planes

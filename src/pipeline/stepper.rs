@@ -2,11 +2,12 @@
 
 use super::context::RunContext;
 use super::cycle::{Cycle, CycleRecord, Place};
-use super::estimate::{Checked, EstimateRef, OwnMaps, Searched, ViewEstimate};
+use super::estimate::{Checked, CheckedPlanes, EstimateRef, OwnMaps, Searched, ViewEstimate};
 use super::progress::Tracker;
 use super::result::ViewResult;
 use super::sources::{PublishedSurfaces, SourcePlanes};
-use super::stages::{self, Candidates, SearchInput};
+use super::stages::{self, Candidates, Propagation, SearchInput};
+use super::view_tasks;
 use crate::error::{Error, Result};
 use crate::fusion::PointCloud;
 use crate::options::Options;
@@ -109,7 +110,7 @@ impl Stepper {
             return Err(Error::argument("estimate", value, expected));
         }
         self.check_size(estimate.cycle(), estimate, "estimate")?;
-        Ok(stages::upsampled(&self.0, at, estimate))
+        Ok(self.publish(stages::upsampled(&self.0, at, estimate)))
     }
 
     /// The candidates for the pixels of a view that have no validated plane: of the planes of other views
@@ -123,8 +124,13 @@ impl Stepper {
         let at = Place { cycle, view };
         self.check_estimates(at, estimates)?;
         let known = |view: usize| estimates.get(view).copied().flatten();
-        let donors = self.0.donors(at, |donor| known(donor).map(ViewEstimate::planes));
-        stages::propagate(&self.0, at, known(view), &donors, &|_| Ok(()))
+        let mut propagation = Propagation::new(&self.0, at, known(view).map(ViewEstimate::as_own));
+        for &donor in propagation.donors() {
+            if let Some(found) = known(donor as usize) {
+                propagation.add(donor as usize, found.planes(), &|_| Ok(()))?;
+            }
+        }
+        Ok(propagation.finish())
     }
 
     /// Searches the planes of a view and fills its textureless regions. Starts from the view's own checked
@@ -154,15 +160,10 @@ impl Stepper {
         }
         let tracker = Tracker::with_work(progress, self.cycles()[cycle].work(pixels as u64));
         let advance = |units| tracker.advance(units, self.0.progress(Phase::Search, at));
-        let known = |view: usize| estimates.get(view).copied().flatten();
-        let own = known(view);
-        let images = self.0.images(at)?;
-        let problem = self.0.problem(at, &images, self.surfaces(view, estimates));
+        let own = estimates.get(view).copied().flatten().map(ViewEstimate::as_own);
         let is_guided = estimates.iter().any(Option::is_some);
         let input = SearchInput { own, candidates, is_guided };
-        let found = stages::search(&self.0, at, &problem, input, &advance)?;
-        let searched = stages::fill_textureless(&self.0, &problem, found);
-        Ok(stages::record_search(&self.0, own, searched))
+        view_tasks::search(&self.0, at, self.surfaces(view, estimates), input, &advance)
     }
 
     /// Checks the planes of a view against those of its sources, then corrects foreground fattening (where
@@ -182,12 +183,7 @@ impl Stepper {
         self.check_sources(own.at, sources)?;
         let planes = |view: usize| sources.get(view).copied().flatten().map(EstimateRef::planes);
         let planes = SourcePlanes::new(self.sources(own.view()), planes);
-        let verdicts = stages::check(&self.0, own, planes, &|_| Ok(()))?;
-        let image = self.0.image(own.at)?;
-        let mut checked = stages::apply_check(own.clone(), &verdicts);
-        stages::correct_fattening(&self.0, &image, &mut checked);
-        stages::smooth_planes(&self.0, &image, &mut checked);
-        Ok(stages::publish(&self.0, checked))
+        view_tasks::check(&self.0, own, planes, &|_| Ok(()))
     }
 
     /// The cycle that follows this one; `None` after the last. Call it once every view is checked
@@ -234,16 +230,9 @@ impl Stepper {
         };
         let tracker = Tracker::with_work(progress, 1);
         let advance = |units| tracker.advance(units, self.0.progress(Phase::Check, at));
-        let images = self.0.images(at)?;
-        let problem = self.0.problem(at, &images, self.surfaces(view, estimates));
-        let mut planes = stages::average_across_views(&self.0, &problem, own);
-        let filled = stages::fill_gaps(&self.0, at, &images.own, &planes);
         let known = |view: usize| estimates.get(view).copied().flatten().map(ViewEstimate::planes);
         let sources = SourcePlanes::new(self.sources(view), known);
-        let filled = stages::recheck(&self.0, &problem, filled, sources, &advance)?;
-        filled.write_to(&mut planes);
-        stages::remove_speckles(&self.0, at, &images.own, &mut planes);
-        stages::classify(&self.0, &problem, own.clone(), planes, &filled, &advance)
+        view_tasks::finish(&self.0, at, self.surfaces(view, estimates), own.as_own(), sources, &advance)
     }
 
     /// Fuses the validated pixels of the results of all views into points.
@@ -261,8 +250,20 @@ impl Stepper {
         stages::fuse(scene, &self.0.options, results, progress)
     }
 
+    /// The views that have a view among their sources, ascending.
+    #[cfg(feature = "io")]
+    pub(crate) fn readers(&self, view: usize) -> &[u32] {
+        self.0.readers(view)
+    }
+
     pub(super) fn context(&self) -> &RunContext {
         &self.0
+    }
+
+    /// Publishes the surface of an estimate that has none yet.
+    pub(crate) fn publish(&self, planes: ViewEstimate<CheckedPlanes>) -> ViewEstimate<Checked> {
+        let surface = stages::surface(&self.0, &planes);
+        planes.into_stage(Checked { surface }).0
     }
 
     fn surfaces<'e>(&self, view: usize, estimates: Known<'e, Checked>) -> PublishedSurfaces<'e> {

@@ -20,6 +20,19 @@ impl CompactPlane {
         self.inverse_depth
     }
 
+    /// As bytes, for a file of this version of the crate.
+    #[cfg(feature = "io")]
+    pub(crate) fn to_bytes(self) -> [u8; 8] {
+        (u64::from(self.slopes) << 32 | u64::from(self.inverse_depth.to_bits())).to_le_bytes()
+    }
+
+    /// The plane of [`CompactPlane::to_bytes`].
+    #[cfg(feature = "io")]
+    pub(crate) fn from_bytes(bytes: [u8; 8]) -> CompactPlane {
+        let bits = u64::from_le_bytes(bytes);
+        CompactPlane { inverse_depth: f32::from_bits(bits as u32), slopes: (bits >> 32) as u32 }
+    }
+
     /// Its change per pixel along x and y.
     #[inline(always)]
     pub(crate) fn slopes(&self) -> (f32, f32) {

@@ -104,17 +104,24 @@ pub struct Plan {
     pub slurm: Option<PathBuf>,
 }
 
-/// A planned run and how to work on it.
+/// What a command may take of the machine; the result does not depend on it.
 #[derive(Args)]
-pub struct Planned {
-    /// Folder of the run, as planned by `skep plan`
-    pub folder: PathBuf,
+pub struct Resources {
     /// Worker threads at most; 0 uses one for each core
     #[arg(short, long, value_name = "N", default_value_t = 0)]
     threads: usize,
     /// Memory to keep to, such as 8GiB [default: three quarters of what the machine allows]
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     memory: Option<u64>,
+}
+
+/// A planned run and how to work on it.
+#[derive(Args)]
+pub struct Planned {
+    /// Folder of the run, as planned by `skep plan`
+    pub folder: PathBuf,
+    #[command(flatten)]
+    pub resources: Resources,
     /// Print warnings and errors only
     #[arg(short, long)]
     pub quiet: bool,
@@ -150,7 +157,7 @@ pub struct FinishViews {
     pub views: Option<Range<usize>>,
 }
 
-impl Planned {
+impl Resources {
     /// The options that do not change the result.
     pub fn options(&self) -> Options {
         Options { threads: self.threads, memory: self.memory.unwrap_or(0), ..Options::default() }
@@ -213,6 +220,8 @@ pub struct Fuse {
     /// Leave pixels of a smaller confidence, 0 to 1, out of the cloud; only maps of skep have confidences
     #[arg(long, value_name = "C")]
     min_confidence: Option<f64>,
+    #[command(flatten)]
+    pub resources: Resources,
     /// Print warnings and errors only
     #[arg(short, long)]
     pub quiet: bool,

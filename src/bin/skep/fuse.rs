@@ -3,11 +3,11 @@
 use crate::arguments::Fuse;
 use crate::interrupt::Interrupt;
 use crate::progress::Display;
-use crate::{Failure, streams, tasks};
+use crate::{Failure, reconstruct, streams, tasks};
 use skep::fusion::{FusionView, fuse, overlaps};
 use skep::io::{SceneFolder, Workspace, WorkspaceMaps};
 use skep::job::{self, Job, Task};
-use skep::{Error, FusionOptions, Options, PointCloud, Progress};
+use skep::{Error, FusionOptions, PointCloud, Progress};
 
 /// Runs the command.
 pub fn run(arguments: &Fuse) -> Result<(), Failure> {
@@ -37,7 +37,10 @@ pub fn run(arguments: &Fuse) -> Result<(), Failure> {
     let interrupt = Interrupt::watch();
     let output = arguments.output();
     let options = arguments.options().map_err(Failure::Usage)?;
-    let cloud = fuse_maps(&maps, &options, display, &interrupt).inspect_err(|error| {
+    let threads = arguments.resources.options().threads;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|error| Error::argument("--threads", threads, error.to_string()))?;
+    let cloud = pool.install(|| fuse_maps(&maps, &options, display, &interrupt)).inspect_err(|error| {
         if *error == Error::Cancelled {
             streams::notice(&format!("interrupted: {} was not written", output.display()));
         }
@@ -53,12 +56,9 @@ pub fn run(arguments: &Fuse) -> Result<(), Failure> {
 
 /// Does the last task of a run.
 fn task(arguments: &Fuse, display: Display) -> Result<(), Failure> {
-    let job = Job::open(&arguments.workspace, &Options::default())?;
+    let job = Job::open(&arguments.workspace, &arguments.resources.options())?;
     tasks::run(&job, &[Task::Fuse], display)?;
-    if !arguments.quiet {
-        streams::result(&format!("the cloud is {}", job.workspace().cloud().display()));
-    }
-    Ok(())
+    reconstruct::conclude(&job, &job.summary()?, None, arguments.quiet)
 }
 
 fn fuse_maps(

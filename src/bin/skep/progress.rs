@@ -128,7 +128,7 @@ fn line(progress: &Progress, first: f64, elapsed: Duration) -> String {
 fn step(progress: &Progress) -> String {
     let phase = progress.phase.name();
     match (progress.phase, progress.downscale) {
-        (Phase::Fusion, _) => phase.to_owned(),
+        (Phase::Read | Phase::Fusion, _) => phase.to_owned(),
         (_, 1) => format!("{phase} at full size, cycle {}", progress.cycle + 1),
         (_, downscale) => format!("{phase} at 1/{downscale} size, cycle {}", progress.cycle + 1),
     }

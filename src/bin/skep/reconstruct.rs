@@ -4,7 +4,7 @@ use crate::arguments::{Reconstruct, Run};
 use crate::interrupt::Interrupt;
 use crate::progress::Display;
 use crate::report::{Report, Totals};
-use crate::stopwatch::{Stage, Stopwatch};
+use crate::stopwatch::{Stage, Stopwatch, Times};
 use crate::{Failure, dump, streams};
 use skep::io::Workspace;
 use skep::job::{Job, Needs, Summary};
@@ -24,12 +24,12 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
     let run = &arguments.run;
     let stopwatch = Mutex::new(Stopwatch::start());
     let display = Display::new(run.quiet);
-    let job = plan(run, display)?;
+    let interrupt = Interrupt::watch();
+    let job = plan(run, display, &interrupt)?;
     if let Some(folder) = &arguments.dump {
         require_writable(folder)?;
     }
     let output = run.output();
-    let interrupt = Interrupt::watch();
     // A report says that the files beside it are complete and of this run.
     let report = report_path(&output);
     if job.is_complete() && report.is_file() {
@@ -48,31 +48,53 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
 
     let mut stopwatch = stopwatch.into_inner().unwrap_or_else(PoisonError::into_inner);
     stopwatch.enter(Stage::Writing);
-    let mut report = Report::new(&job, &run.preset, &result);
+    conclude(&job, &result, Some(stopwatch.times()), run.quiet)
+}
+
+/// Writes the report of a complete run, and says what the run made. `times` are those of the whole run.
+pub fn conclude(
+    job: &Job,
+    result: &Summary,
+    times: Option<Times>,
+    quiet: bool,
+) -> std::result::Result<(), Failure> {
+    let mut report = Report::new(job, result);
     let scene = job.scene();
     let ranges: Vec<DepthRange> = (0..scene.views().len()).map(|view| scene.depth_range(view)).collect();
     let empty = (report.totals.points == 0).then(|| empty_cloud(&report.totals, &ranges, job.options()));
     report.warnings.extend(empty.clone());
-    report.set_times(stopwatch.times());
-    // One that is there is of the process that did the work, with its times.
-    if !report_path(&output).is_file() {
-        report.write(&report_path(&output))?;
+    if let Some(times) = times {
+        report.set_times(times);
     }
-
+    // One that is there is of the process that did the work, with its times.
+    let output = job.workspace().folder();
+    if !report_path(output).is_file() {
+        report.write(&report_path(output))?;
+    }
     empty.iter().for_each(|warning| streams::warning(warning));
-    if !run.quiet {
-        summary(&output, scene, &ranges, &report.totals).iter().for_each(|line| streams::result(line));
+    if !quiet {
+        summary(output, scene, &ranges, &report.totals).iter().for_each(|line| streams::result(line));
     }
     Ok(())
 }
 
 /// Plans the run, and says what became of an earlier one and what this one needs.
-pub fn plan(run: &Run, display: Display) -> std::result::Result<Job, Failure> {
+pub fn plan(run: &Run, display: Display, interrupt: &Interrupt) -> std::result::Result<Job, Failure> {
     let depth_range = run.depth_range().map_err(Failure::Usage)?;
     let options = run.options().map_err(Failure::Usage)?;
     options.check().map_err(Failure::Usage)?;
     display.print(&format!("reading {}", run.scene.display()));
-    let job = Job::plan(&run.scene, depth_range, &options, &run.output(), run.fresh)?;
+    let reporter = display.start();
+    let progress = |progress: &Progress| {
+        reporter.show(progress);
+        interrupt.control_flow()
+    };
+    let job = Job::plan(&run.scene, depth_range, &options, &run.output(), run.fresh, &progress).inspect_err(|error| {
+        if *error == Error::Cancelled {
+            streams::notice("interrupted while reading: nothing was changed");
+        }
+    })?;
+    drop(reporter);
     job.notices().iter().for_each(|notice| streams::warning(notice));
     job.scene().warnings().iter().for_each(|warning| streams::warning(warning));
     display.print(&needs(&job));
@@ -152,7 +174,7 @@ fn summary(output: &Path, scene: &Scene, ranges: &[DepthRange], totals: &Totals)
     lines.push(format!("previews such as {}", workspace.preview(first, "depth").display()));
     lines.push(format!("maps in {}", output.join("stereo").display()));
     lines.push(format!("counts and times in {}", report_path(output).display()));
-    lines.push(format!("done in {:.1} s", totals.wall_seconds));
+    lines.extend(totals.wall_seconds.map(|seconds| format!("done in {seconds:.1} s")));
     lines
 }
 

@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::Value;
 use skep::job::{Job, Summary, ViewSummary};
 use skep::simd::SimdLevel;
-use skep::{Counts, CycleRecord, OptionValue, PixelStatus, Result, Scene};
+use skep::{Counts, CycleRecord, OptionValue, Options, PixelStatus, Result, Scene};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
@@ -17,12 +17,13 @@ pub struct Report {
     version: &'static str,
     simd: &'static str,
     threads: usize,
-    preset: String,
+    /// The preset whose options these are; `null` if some differ.
+    preset: Option<&'static str>,
     options: BTreeMap<&'static str, Value>,
     /// Of the scene, then of the run.
     pub warnings: Vec<String>,
     pub totals: Totals,
-    phases: Times,
+    phases: Option<Times>,
     views: Vec<ViewReport>,
 }
 
@@ -38,8 +39,9 @@ pub struct Totals {
     pub early_terminations: u64,
     pub cycles: Vec<CycleReport>,
     pub points: usize,
-    pub wall_seconds: f64,
-    pub cpu_seconds: f64,
+    /// `null`, as the other times and the memory, where several processes did the run.
+    pub wall_seconds: Option<f64>,
+    pub cpu_seconds: Option<f64>,
     pub peak_resident_bytes: Option<u64>,
 }
 
@@ -73,7 +75,7 @@ pub struct CycleReport {
 
 impl Report {
     /// Collects everything but the times, which [`Report::set_times`] sets.
-    pub fn new(job: &Job, preset: &str, result: &Summary) -> Report {
+    pub fn new(job: &Job, result: &Summary) -> Report {
         let (scene, options) = (job.scene(), job.options());
         let views =
             result.views.iter().enumerate().map(|(index, view)| view_report(job, index, view)).collect();
@@ -81,11 +83,11 @@ impl Report {
             version: env!("CARGO_PKG_VERSION"),
             simd: options.simd.unwrap_or_else(SimdLevel::detect).name(),
             threads: skep::thread_count(scene, options),
-            preset: preset.to_owned(),
+            preset: preset_of(options),
             options: options.values().map(|(name, value)| (name, typed(value))).collect(),
             warnings: scene.warnings().iter().chain(&result.warnings).cloned().collect(),
             totals: totals(scene, result),
-            phases: Times::default(),
+            phases: None,
             views,
         }
     }
@@ -93,9 +95,9 @@ impl Report {
     /// Sets the time of each phase and of the whole run, and the peak memory.
     pub fn set_times(&mut self, times: Times) {
         let total = times.total();
-        self.phases = times;
-        self.totals.wall_seconds = total.wall_seconds;
-        self.totals.cpu_seconds = total.cpu_seconds;
+        self.phases = Some(times);
+        self.totals.wall_seconds = Some(total.wall_seconds);
+        self.totals.cpu_seconds = Some(total.cpu_seconds);
         self.totals.peak_resident_bytes = peak_resident_bytes();
     }
 
@@ -106,6 +108,14 @@ impl Report {
             out.write_all(b"\n")
         })
     }
+}
+
+/// The preset with these options, apart from those that do not change the result.
+fn preset_of(options: &Options) -> Option<&'static str> {
+    Options::PRESETS.into_iter().find(|name| {
+        let Options { threads, memory, simd, .. } = *options;
+        Options::preset(name).is_ok_and(|preset| Options { threads, memory, simd, ..preset } == *options)
+    })
 }
 
 /// An option's value as JSON.
@@ -142,8 +152,8 @@ fn totals(scene: &Scene, result: &Summary) -> Totals {
         early_terminations: counts.early_terminations,
         cycles: cycles.iter().map(CycleReport::from).collect(),
         points: result.points,
-        wall_seconds: 0.0,
-        cpu_seconds: 0.0,
+        wall_seconds: None,
+        cpu_seconds: None,
         peak_resident_bytes: None,
     }
 }

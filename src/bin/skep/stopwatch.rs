@@ -18,6 +18,7 @@ pub enum Stage {
 impl From<Phase> for Stage {
     fn from(phase: Phase) -> Stage {
         match phase {
+            Phase::Read => Stage::Reading,
             Phase::Search => Stage::Search,
             Phase::Check => Stage::Check,
             Phase::Fusion => Stage::Fusion,

@@ -12,7 +12,7 @@ use std::ops::Range;
 /// `skep plan`: prepares the folder, and prints the tasks or writes them to the files that were asked for.
 pub fn plan(arguments: &Plan) -> Result<(), Failure> {
     let run = &arguments.run;
-    let job = reconstruct::plan(run, Display::new(run.quiet))?;
+    let job = reconstruct::plan(run, Display::new(run.quiet), &Interrupt::watch())?;
     let folder = run.output();
     if let Some(file) = &arguments.openjd {
         plan_files::write_openjd(&job, &folder, file)?;
@@ -47,7 +47,7 @@ pub fn finish(arguments: &FinishViews) -> Result<(), Failure> {
 /// `skep next`
 pub fn next(arguments: &NextCycle) -> Result<(), Failure> {
     let planned = &arguments.planned;
-    let job = Job::open(&planned.folder, &planned.options())?;
+    let job = Job::open(&planned.folder, &planned.resources.options())?;
     Ok(run(&job, &[Task::Next { cycle: arguments.cycle }], Display::new(planned.quiet))?)
 }
 
@@ -57,7 +57,7 @@ fn of_views(
     views: Option<&Range<usize>>,
     task: impl Fn(usize) -> Task,
 ) -> Result<(), Failure> {
-    let job = Job::open(&planned.folder, &planned.options())?;
+    let job = Job::open(&planned.folder, &planned.resources.options())?;
     let count = job.scene().views().len();
     let views = views.cloned().unwrap_or(0..count);
     if views.end > count {

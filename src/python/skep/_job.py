@@ -12,7 +12,7 @@ from ._buffers import path
 from ._errors import check
 from ._native import ffi, lib
 from ._options import Options
-from ._run import ProgressFunction, run_plain
+from ._run import ProgressFunction, run, run_plain
 
 
 class Task(IntEnum):
@@ -65,17 +65,21 @@ class Job:
         *,
         depth_range: tuple[float, float] = (0.0, 0.0),
         fresh: bool = False,
+        progress: ProgressFunction | None = None,
     ) -> Job:
         """Plans the run of a COLMAP scene (images/ and sparse/) in a folder, which is created. A run of the
         same photographs, model, options and version that began there goes on, unless `fresh`; anything else
-        begins anew, and `notices` tells why.
+        begins anew, and `notices` tells why. `progress` is told of the photographs that are read.
         """
         near, far = depth_range
-        out = ffi.new("skep_job **")
         chosen = _options.handle(options)
         names = path(scene, "scene"), path(folder, "folder")
-        check(lib.skep_job_plan(names[0], near, far, chosen, names[1], int(fresh), out))
-        return Job(ffi.gc(out[0], lib.skep_job_destroy))
+
+        def call(callback: Any, user: Any, out: Any) -> int:
+            wanted = (names[0], near, far, chosen, names[1], int(fresh))
+            return int(lib.skep_job_plan(*wanted, callback, user, out))
+
+        return Job(run(call, "skep_job", progress))
 
     @staticmethod
     def open(folder: str | os.PathLike[str], options: Options | None = None) -> Job:

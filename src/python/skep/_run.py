@@ -24,6 +24,7 @@ class Phase(IntEnum):
     SEARCH = lib.SKEP_PHASE_SEARCH
     CHECK = lib.SKEP_PHASE_CHECK
     FUSION = lib.SKEP_PHASE_FUSION
+    READ = lib.SKEP_PHASE_READ
 
 
 @dataclass(frozen=True)
