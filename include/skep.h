@@ -172,6 +172,11 @@ typedef struct skep_stepper skep_stepper;
 #define SKEP_ERR_PANIC -7
 
 /**
+ * There is not enough memory for the call.
+ */
+#define SKEP_ERR_MEMORY -8
+
+/**
  * Result of a call: SKEP_OK or one of the negative SKEP_ERR_ codes; skep_last_error returns the text.
  */
 typedef int32_t skep_status;
@@ -873,6 +878,11 @@ skep_status skep_scene_get_triangulation_angle(const struct skep_scene *scene,
  * Fusion of maps into points.
  */
 #define SKEP_PHASE_FUSION 2
+
+/**
+ * Reading of photographs.
+ */
+#define SKEP_PHASE_READ 3
 
 /**
  * Progress of a call.
@@ -2271,11 +2281,14 @@ typedef struct skep_job_needs {
  * @param options_or_null  The options, copied; NULL: the default preset.
  * @param folder           Path of the folder of the run.
  * @param fresh            Non-zero begins anew in any case.
+ * @param progress_or_null  Receives the progress of reading the photographs and may cancel; NULL: none.
+ * @param user             Passed to the callback; may be NULL.
  * @param job_out          Receives the job; destroy it with skep_job_destroy.
  * @retval SKEP_ERR_ARGUMENT  Options or depths out of range, less memory than the run needs, or a scene that
  *                            skep_scene_validate refuses.
  * @retval SKEP_ERR_FILE      A file that is missing or damaged; a folder that cannot be written, holds
  *                            another scene, or in which another process works.
+ * @retval SKEP_ERR_CANCELLED  The callback returned non-zero; an earlier run in the folder is as it was.
  */
 skep_status skep_job_plan(const char *scene,
                           double near,
@@ -2283,6 +2296,8 @@ skep_status skep_job_plan(const char *scene,
                           const struct skep_options *options_or_null,
                           const char *folder,
                           int32_t fresh,
+                          skep_progress_fn progress_or_null,
+                          void *user,
                           struct skep_job **job_out);
 
 /**

@@ -1,5 +1,6 @@
 //! The error type: what was wrong, and what was expected.
 
+use crate::memory::format_bytes;
 use std::fmt;
 use std::path::PathBuf;
 
@@ -31,6 +32,13 @@ pub enum Error {
         line: Option<usize>,
         /// What is wrong and what was expected.
         problem: String,
+    },
+    /// There is not enough memory for a call.
+    Memory {
+        /// What it needs, in bytes.
+        bytes: u64,
+        /// What needs it.
+        purpose: String,
     },
     /// The progress function returned `Break`.
     Cancelled,
@@ -64,6 +72,9 @@ impl fmt::Display for Error {
                 write!(f, "{}, line {line}: {problem}", path.display())
             }
             Error::File { path, line: None, problem } => write!(f, "{}: {problem}", path.display()),
+            Error::Memory { bytes, purpose } => {
+                write!(f, "not enough memory: {purpose} needs {}", format_bytes(*bytes))
+            }
             Error::Cancelled => write!(f, "cancelled"),
         }
     }

@@ -31,6 +31,9 @@ pub const SKEP_ERR_CAPACITY: i32 = -6;
 /// An error in the library itself; please report the text.
 pub const SKEP_ERR_PANIC: i32 = -7;
 
+/// There is not enough memory for the call.
+pub const SKEP_ERR_MEMORY: i32 = -8;
+
 /// A failed call.
 pub struct Failure {
     status: skep_status,
@@ -52,6 +55,7 @@ impl From<Error> for Failure {
         let status = match error {
             Error::Argument { .. } => SKEP_ERR_ARGUMENT,
             Error::File { .. } => SKEP_ERR_FILE,
+            Error::Memory { .. } => SKEP_ERR_MEMORY,
             Error::Cancelled => SKEP_ERR_CANCELLED,
         };
         Failure::new(status, error.to_string())
@@ -127,6 +131,7 @@ pub extern "C" fn skep_status_name(status: skep_status) -> *const c_char {
         SKEP_ERR_POISONED => c"poisoned",
         SKEP_ERR_CANCELLED => c"cancelled",
         SKEP_ERR_FILE => c"file",
+        SKEP_ERR_MEMORY => c"memory",
         SKEP_ERR_CAPACITY => c"capacity",
         SKEP_ERR_PANIC => c"panic",
         _ => c"unknown",

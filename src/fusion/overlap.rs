@@ -2,26 +2,74 @@
 
 use crate::scene::{SparsePoint, Tracks, nearest_views};
 use glam::DVec3;
+use std::cmp::Ordering;
 
-/// Views that a view chooses to be compared with: a surface that as many photographs show is averaged well
-/// enough, and the maps of all of them must be in memory at the same time.
-const MAX_CHOSEN: usize = 24;
+/// Views that a view is compared with: a surface that as many photographs show is averaged well enough, and the
+/// maps of all of them must be in memory at the same time.
+const MOST_VIEWS: usize = 24;
+/// Views that it is compared with also if all of them have as many as that already.
+const LEAST_VIEWS: usize = 8;
 
-/// For each view those that are compared with it, ascending: those that saw a sparse point together with it, of
-/// more than 24 the ones with the most common points, and the views that choose it in this way. A view that saw
-/// none with any other may see the surfaces of all others, and so overlaps all of them, and they overlap it: the
-/// overlap of two views is mutual, so that a surface gives the same points whichever of them is the reference
-/// first.
+/// For each view those that are compared with it, ascending: those that saw a sparse point together with it; of
+/// more than 24 those with the most common points. A view that saw none with any other may see the surfaces of
+/// all others: it is compared with the nearest ones. The overlap of two views is mutual, so that a surface gives
+/// the same points whichever of them is the reference first.
 ///
-/// `centers` are the camera centers of all views; a point's views must be below their number. In a scene of
-/// more than 1,000 views a view without common points overlaps the 256 views with the nearest cameras. Of
-/// sparse points with long tracks, more than 33 views, only a part of the pairs of views is taken where all
-/// points together have more than 16 million pairs; two views with many common points overlap in any case.
+/// `centers` are the camera centers of all views; a point's views must be below their number. Of sparse points
+/// with long tracks, more than 33 views, only a part of the pairs of views is taken where all points together
+/// have more than 16 million pairs; two views with many common points overlap in any case.
 pub fn overlaps(centers: &[DVec3], points: &[SparsePoint]) -> Vec<Vec<u32>> {
+    let mut pairs = pairs(centers, points);
+    // The best first: each pair is taken while both of its views have room for it.
+    pairs.sort_unstable_by(Pair::compare);
+    pairs.dedup_by_key(|pair| pair.views);
+    let mut overlaps: Vec<Vec<u32>> = vec![Vec::new(); centers.len()];
+    let mut take = |pair: &Pair, has_room: &dyn Fn([usize; 2]) -> bool| {
+        let [a, b] = pair.views;
+        let is_taken = has_room(pair.views.map(|view| overlaps[view as usize].len()));
+        if is_taken {
+            overlaps[a as usize].push(b);
+            overlaps[b as usize].push(a);
+        }
+        is_taken
+    };
+    pairs.retain(|pair| !take(pair, &|counts| counts.iter().all(|&count| count < MOST_VIEWS)));
+    pairs.retain(|pair| !take(pair, &|counts| counts.iter().any(|&count| count < LEAST_VIEWS)));
+    for overlap in &mut overlaps {
+        overlap.sort_unstable();
+        overlap.shrink_to_fit();
+    }
+    overlaps
+}
+
+/// Two views that may see the same surface, the first of the lower number.
+struct Pair {
+    views: [u32; 2],
+    /// Common sparse points, as the exponent of a power of two: long tracks are counted in part.
+    magnitude: Option<u32>,
+    squared_distance: f64,
+}
+
+impl Pair {
+    /// That with the most common points first, of about equally many that of the nearest cameras.
+    fn compare(&self, other: &Pair) -> Ordering {
+        let by_points = other.magnitude.cmp(&self.magnitude);
+        let by_distance = self.squared_distance.total_cmp(&other.squared_distance);
+        by_points.then(by_distance).then(self.views.cmp(&other.views))
+    }
+}
+
+/// The pairs of views that share sparse points, and of those that share none with any other view, the pairs with
+/// the nearest ones.
+fn pairs(centers: &[DVec3], points: &[SparsePoint]) -> Vec<Pair> {
     let views = centers.len();
     let tracks = Tracks::new(views, points);
-    // By view, the others with the number of common points.
-    let mut common: Vec<Vec<(u32, u32)>> = vec![Vec::new(); views];
+    let (mut pairs, mut is_alone) = (Vec::new(), vec![true; views]);
+    let pair = |a: usize, b: usize, magnitude| Pair {
+        views: [a.min(b) as u32, a.max(b) as u32],
+        magnitude,
+        squared_distance: centers[a].distance_squared(centers[b]),
+    };
     let mut counts = vec![0u32; views];
     for view in 0..views {
         let mut others = Vec::new();
@@ -32,43 +80,14 @@ pub fn overlaps(centers: &[DVec3], points: &[SparsePoint]) -> Vec<Vec<u32>> {
             counts[other] += 1;
         });
         for other in others {
-            let count = std::mem::take(&mut counts[other]);
-            common[view].push((other as u32, count));
-            common[other].push((view as u32, count));
+            (is_alone[view], is_alone[other]) = (false, false);
+            pairs.push(pair(view, other, std::mem::take(&mut counts[other]).checked_ilog2()));
         }
     }
-    let mut overlaps: Vec<Vec<u32>> = vec![Vec::new(); views];
-    for (view, others) in common.into_iter().enumerate() {
-        for other in most_common(centers, view, others) {
-            overlaps[view].push(other);
-            overlaps[other as usize].push(view as u32);
-        }
+    for view in (0..views).filter(|&view| is_alone[view]) {
+        pairs.extend(nearest_views(centers, view).into_iter().map(|other| pair(view, other as usize, None)));
     }
-    let alone: Vec<usize> = (0..views).filter(|&view| overlaps[view].is_empty()).collect();
-    for view in alone {
-        for other in nearest_views(centers, view) {
-            overlaps[view].push(other);
-            overlaps[other as usize].push(view as u32);
-        }
-    }
-    for overlap in &mut overlaps {
-        overlap.sort_unstable();
-        overlap.dedup();
-        overlap.shrink_to_fit();
-    }
-    overlaps
-}
-
-/// The views with the most common points, at most [`MAX_CHOSEN`]: of about equally many, within a power of two as
-/// long tracks are counted in part, those with the nearest cameras, then those of lower numbers.
-fn most_common(centers: &[DVec3], view: usize, mut others: Vec<(u32, u32)>) -> impl Iterator<Item = u32> {
-    let distance = |other: u32| centers[other as usize].distance_squared(centers[view]);
-    let magnitude = |count: u32| count.checked_ilog2();
-    others.sort_by(|a, b| {
-        let by_count = magnitude(b.1).cmp(&magnitude(a.1));
-        by_count.then(distance(a.0).total_cmp(&distance(b.0))).then(a.0.cmp(&b.0))
-    });
-    others.into_iter().take(MAX_CHOSEN).map(|(other, _)| other)
+    pairs
 }
 
 #[cfg(test)]
@@ -106,7 +125,7 @@ mod tests {
         assert!(is_mutual(&found));
         for view in 160..240u32 {
             let own = &found[view as usize];
-            assert!((24..=60).contains(&own.len()), "{view}: {}", own.len());
+            assert_eq!(own.len(), 24, "{view}: {own:?}");
             let near = (1..=5).flat_map(|distance| [view - distance, view + distance]);
             assert!(near.into_iter().all(|other| own.contains(&other)), "{view}: {own:?}");
         }
@@ -117,7 +136,17 @@ mod tests {
         let centers: Vec<DVec3> = (0..100).map(|view| DVec3::X * f64::from(view)).collect();
         let found = overlaps(&centers, &[point(0..100), point(0..100)]);
         assert!(found[50].iter().copied().eq((38..50).chain(51..63)));
-        assert!(found[0].iter().copied().eq(1..25));
+        assert!(found[0][..12].iter().copied().eq(1..13), "the others near it have enough");
+        assert!(is_mutual(&found));
+    }
+
+    #[test]
+    fn a_view_that_all_others_would_leave_out_is_compared_with_some_of_them() {
+        // The last view is far from the others, which have enough near ones.
+        let centers: Vec<DVec3> = (0..100).map(|view| DVec3::X * f64::from(view + view / 99 * 900)).collect();
+        let found = overlaps(&centers, &[point(0..100)]);
+        assert_eq!(found[99].len(), 8);
+        assert!(found.iter().all(|own| (8..=25).contains(&own.len())));
         assert!(is_mutual(&found));
     }
 
@@ -125,9 +154,9 @@ mod tests {
     fn a_view_without_points_overlaps_the_nearest_views_of_a_large_scene() {
         let centers: Vec<DVec3> = (0..3000).map(|view| DVec3::X * f64::from(view)).collect();
         let found = overlaps(&centers, &[point([0, 2999])]);
-        assert_eq!((found[0].len(), found[1500].len()), (1 + 128, 256));
-        assert!(found[1500].iter().copied().eq((1372..1500).chain(1501..1629)));
+        assert!(found[0].contains(&2999));
+        assert!(found[1500].iter().copied().eq((1488..1500).chain(1501..1513)));
         assert!(is_mutual(&found));
-        assert!(found.iter().map(Vec::len).sum::<usize>() < 3000 * 2 * 256);
+        assert!(found.iter().all(|own| own.len() <= 24));
     }
 }

@@ -3,6 +3,7 @@
 use super::files::{FileReader, write_file};
 use crate::error::{Error, Result};
 use crate::fusion::PointViews;
+use crate::memory::require_memory;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -117,6 +118,7 @@ fn open_map(path: &Path, channels: u32) -> Result<(FileReader, u32, u32)> {
             file.remaining()
         )));
     }
+    require_memory(file.remaining(), format!("the map {}", path.display()))?;
     Ok((file, width, height))
 }
 

@@ -4,8 +4,9 @@ use super::files::{cannot_be_read, write_file};
 use crate::error::Result;
 use crate::geometry::Camera;
 use crate::image::Picture;
+use crate::memory::require_memory;
 use image::codecs::png::PngEncoder;
-use image::{ColorType, DynamicImage, ExtendedColorType, ImageEncoder, ImageReader, Limits};
+use image::{ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageReader, Limits};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Seek};
 use std::path::Path;
@@ -24,7 +25,16 @@ pub(crate) fn picture_from_bytes(bytes: &[u8], path: &Path) -> Result<Picture> {
 }
 
 fn decode<R: BufRead + Seek>(reader: ImageReader<R>, path: &Path) -> Result<Picture> {
-    let image = reader.decode().map_err(|error| cannot_be_read(path, error))?;
+    let decoder = reader.into_decoder().and_then(|mut decoder| {
+        decoder.set_limits(limits())?;
+        Ok(decoder)
+    });
+    let decoder = decoder.map_err(|error| cannot_be_read(path, error))?;
+    let (width, height) = decoder.dimensions();
+    // The decoded pixels, then their gray values and colors.
+    let bytes = decoder.total_bytes() + 4 * u64::from(width) * u64::from(height);
+    require_memory(bytes, format!("the photograph {}", path.display()))?;
+    let image = DynamicImage::from_decoder(decoder).map_err(|error| cannot_be_read(path, error))?;
     let (width, height) = (image.width(), image.height());
     if is_gray(&image) {
         return Picture::from_gray(width, height, image.into_luma8().into_raw());
@@ -60,9 +70,14 @@ fn open(path: &Path) -> Result<ImageReader<BufReader<File>>> {
 }
 
 fn limited<R: BufRead + Seek>(mut reader: ImageReader<R>) -> ImageReader<R> {
+    reader.limits(limits());
+    reader
+}
+
+/// The memory is asked for before it is allocated.
+fn limits() -> Limits {
     let mut limits = Limits::no_limits();
     limits.max_image_width = Some(Camera::MAX_SIDE);
     limits.max_image_height = Some(Camera::MAX_SIDE);
-    reader.limits(limits);
-    reader
+    limits
 }

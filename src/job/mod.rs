@@ -24,6 +24,7 @@ use crate::error::{Error, Result};
 use crate::fusion::{fuse_input, overlaps};
 use crate::geometry::DepthRange;
 use crate::io::{CloudWriter, ColmapModel, SceneFolder, Workspace, visibility_path};
+use crate::memory::require_memory;
 use crate::options::Options;
 use crate::parallel::{JoinedPool, ProgressFn, useful_threads};
 use crate::pipeline::{Checked, CheckedEstimates, CycleRecord, Stepper, ViewEstimate, thread_count};
@@ -34,7 +35,7 @@ use fuse::FinishedViews;
 use glam::DVec3;
 use manifest::Manifest;
 pub use needs::Needs;
-use needs::Shares;
+use needs::{Least, Shares};
 pub use run::Summary;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -220,11 +221,14 @@ impl Job {
         if self.is_done(task) {
             return Ok(());
         }
-        self.needs.require(match task {
-            Task::Next { .. } => 0,
-            Task::Fuse => self.shares.least.fusion,
-            _ => self.shares.least.views,
-        })?;
+        let Least { view, fusion, .. } = self.shares.least;
+        let (bytes, purpose) = match task {
+            Task::Next { .. } => (0, ""),
+            Task::Fuse => (fusion, "the fusion of a view with those that overlap it"),
+            _ => (view, "a view with those whose estimates it reads"),
+        };
+        self.needs.require(self.shares.least.base + bytes)?;
+        require_memory(bytes, purpose)?;
         let (content, files) = match task {
             Task::Search { cycle, view } => self.search(cycle, view, progress)?,
             Task::Check { cycle, view } => self.check(cycle, view, progress)?,

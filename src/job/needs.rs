@@ -64,7 +64,11 @@ pub(super) struct Shares {
 /// The least bytes that parts of a run need.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Least {
-    pub views: u64,
+    /// Of the program and the scene.
+    pub base: u64,
+    /// Beyond that, of a task of a view.
+    pub view: u64,
+    /// Beyond that, of the fusion.
     pub fusion: u64,
 }
 
@@ -129,7 +133,7 @@ pub(super) fn needs(
     // One bit of each pixel tells the fusion what is part of a point already. Not part of the base: of many
     // views it is more than another task takes.
     let fusion = fusion_bytes(scene, overlaps) + pixels / 8;
-    let least = Least { views: base + task, fusion: base + fusion };
+    let least = Least { base, view: task, fusion };
     let memory = budget(options);
     // As many tasks at a time as keep the threads busy, and fit.
     let wanted = 1 + (threads as u64 + 2) / 4;
@@ -149,7 +153,7 @@ pub(super) fn needs(
         tasks: tasks as usize,
         images: images as usize,
         estimates: (rest - images) as usize,
-        fusion: memory.saturating_sub(least.fusion) as usize,
+        fusion: memory.saturating_sub(base + fusion) as usize,
     };
     let work: f64 = (0..scene.views().len())
         .map(|view| {
@@ -161,6 +165,6 @@ pub(super) fn needs(
         })
         .sum();
     let disk = pixels * (MAP_BYTES + ESTIMATE_BYTES);
-    let least_memory = least.views.max(least.fusion);
+    let least_memory = base + task.max(fusion);
     (Needs { least_memory, memory, disk, cpu_seconds: work * SECONDS_PER_UNIT }, shares)
 }

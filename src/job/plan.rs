@@ -54,7 +54,8 @@ pub(super) fn read(
         advance(1, view)?;
         Ok(PhotographEntry { name: image.name.clone(), content: fingerprint(&bytes) })
     };
-    let photographs: Vec<_> = model.images.par_iter().enumerate().with_max_len(1).map(entry).collect::<Result<_>>()?;
+    let photographs: Vec<_> =
+        model.images.par_iter().enumerate().with_max_len(1).map(entry).collect::<Result<_>>()?;
     let manifest = Manifest::new(&model, photographs, depth_range, options);
     let scene = scene(folder, model, &manifest)?;
     Ok(Plan { scene, manifest })

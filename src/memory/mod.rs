@@ -2,6 +2,8 @@
 
 mod cache;
 mod limits;
+mod reserve;
 
 pub(crate) use cache::Cache;
 pub use limits::{available_memory, format_bytes, parse_bytes};
+pub(crate) use reserve::require_memory;

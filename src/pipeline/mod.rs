@@ -21,6 +21,7 @@ mod streamed;
 mod view_tasks;
 
 use crate::error::Result;
+use crate::memory::require_memory;
 use crate::options::Options;
 use crate::parallel::{Bands, JoinedPool, Phase, ProgressFn, useful_threads};
 use crate::scene::Scene;
@@ -49,11 +50,17 @@ pub(crate) use streamed::CheckedEstimates;
 /// set.
 ///
 /// # Errors
-/// An option out of its range, named; [`crate::Error::Cancelled`] when `progress` returns `Break`.
+/// An option out of its range, named; less memory than the run needs; [`crate::Error::Cancelled`] when
+/// `progress` returns `Break`.
 pub fn reconstruct(scene: &Scene, options: &Options, progress: ProgressFn) -> Result<Reconstruction> {
     options.check()?;
+    let pixels: u64 = scene.views().iter().map(|view| view.camera.pixels() as u64).sum();
+    require_memory(pixels * BYTES_PER_PIXEL, "a run in memory, of all views at a time,")?;
     JoinedPool::new(thread_count(scene, options))?.install(|| run(scene, options, progress))
 }
+
+/// Bytes that a run in memory takes at least for each pixel of all views together.
+const BYTES_PER_PIXEL: u64 = 40;
 
 /// The number of threads that [`reconstruct`] starts: that of the option `threads`, or one for each core; but
 /// at most four for each core, and no more than there are pairs of rows in all images.

@@ -1,6 +1,6 @@
 //! Ctrl-C, SIGTERM and kill -9: the exit status, what is printed, and that the same command goes on.
 
-use super::{board, command, files, path, skep, small_board, text};
+use super::{board, command, failure, files, path, skep, small_board, text};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -65,4 +65,38 @@ fn a_run_that_is_killed_goes_on_and_gives_the_same_bits() {
     let done = skep(&arguments(path(&killed)));
     assert!(done.status.success(), "{}", text(&done.stderr));
     assert!(results(whole.path()) == results(killed.path()));
+}
+
+#[test]
+fn a_disk_without_room_is_named_and_the_run_goes_on_when_there_is_room() {
+    let scene = small_board();
+    let (whole, full) = (TempDir::new().unwrap(), TempDir::new().unwrap());
+    let arguments = |output| ["reconstruct", path(&scene), "--preset", "fast", "--quiet", "--output", output];
+    assert!(skep(&arguments(path(&whole))).status.success());
+
+    // No file of more than 150 kB: the estimates at half size fit, those at full size do not.
+    let mut limited = Command::new("sh");
+    limited.args(["-c", "trap '' XFSZ; ulimit -f 300; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_skep")]);
+    let failed = limited.args(arguments(path(&full))).output().unwrap();
+    let printed = text(&failed.stderr);
+    assert_eq!(failed.status.code(), Some(1), "{printed}");
+    assert!(printed.contains("run/estimates") && printed.contains("cannot be written"), "{printed}");
+    assert!(!full.path().join("report.json").exists() && !full.path().join("fused.ply").exists());
+
+    let done = skep(&arguments(path(&full)));
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    assert!(results(whole.path()) == results(full.path()));
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_refused_before_anything_is_read() {
+    let scene = small_board();
+    let file = scene.path().join("file");
+    std::fs::write(&file, "").unwrap();
+    // As root no folder is read-only: one below a file stands for it.
+    let output = file.join("dense");
+    let (status, printed) = failure(&["reconstruct", path(&scene), "--output", output.to_str().unwrap()]);
+    assert_eq!(status, Some(1), "{printed}");
+    assert!(printed.contains(output.to_str().unwrap()) && printed.contains("cannot be written"), "{printed}");
+    assert!(!printed.contains("read, 7 views"), "{printed}");
 }

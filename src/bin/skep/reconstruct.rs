@@ -89,11 +89,13 @@ pub fn plan(run: &Run, display: Display, interrupt: &Interrupt) -> std::result::
         reporter.show(progress);
         interrupt.control_flow()
     };
-    let job = Job::plan(&run.scene, depth_range, &options, &run.output(), run.fresh, &progress).inspect_err(|error| {
-        if *error == Error::Cancelled {
-            streams::notice("interrupted while reading: nothing was changed");
-        }
-    })?;
+    let job = Job::plan(&run.scene, depth_range, &options, &run.output(), run.fresh, &progress).inspect_err(
+        |error| {
+            if *error == Error::Cancelled {
+                streams::notice("interrupted while reading: nothing was changed");
+            }
+        },
+    )?;
     drop(reporter);
     job.notices().iter().for_each(|notice| streams::warning(notice));
     job.scene().warnings().iter().for_each(|warning| streams::warning(warning));

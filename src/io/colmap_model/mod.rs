@@ -6,6 +6,7 @@ mod text;
 
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
+use crate::memory::require_memory;
 use crate::scene::SparsePoint;
 use records::Files;
 use std::path::Path;
@@ -38,6 +39,10 @@ pub struct ColmapModel {
     pub points: Vec<SparsePoint>,
 }
 
+/// Bytes that a model takes in memory for each byte of its files, at most: the binary records of points with
+/// short tracks.
+const MEMORY_PER_BYTE: u64 = 3;
+
 impl ColmapModel {
     /// Whether the folder holds the files of a model, binary or text.
     pub fn is_in(folder: &Path) -> bool {
@@ -57,6 +62,7 @@ impl ColmapModel {
                 "neither cameras.bin and images.bin nor cameras.txt and images.txt are in this folder";
             return Err(Error::file(folder, format!("no COLMAP model: {wanted}")));
         };
+        require_memory(MEMORY_PER_BYTE * files.bytes(), format!("the model in {}", folder.display()))?;
         let records = if files.binary { binary::read(&files)? } else { text::read(&files)? };
         records.resolve(&files)
     }

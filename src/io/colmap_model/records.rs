@@ -48,6 +48,12 @@ impl Files {
         Files { binary, cameras: path("cameras"), images: path("images"), points: path("points3D") }
     }
 
+    /// Their size together.
+    pub(super) fn bytes(&self) -> u64 {
+        let size = |path: &PathBuf| std::fs::metadata(path).map_or(0, |metadata| metadata.len());
+        [&self.cameras, &self.images, &self.points].map(size).iter().sum()
+    }
+
     /// The model of a folder; binary files take precedence, as in COLMAP.
     pub(super) fn find(folder: &Path) -> Option<Files> {
         [true, false]

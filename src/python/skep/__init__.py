@@ -66,6 +66,7 @@ __all__ = [
     "FileError",
     "FusionView",
     "InternalError",
+    "NotEnoughMemoryError",
     "Job",
     "JobNeeds",
     "NccWindow",

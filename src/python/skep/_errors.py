@@ -43,13 +43,27 @@ class CapacityError(Error):
     status = lib.SKEP_ERR_CAPACITY
 
 
+class NotEnoughMemoryError(Error, MemoryError):
+    """There is not enough memory for the call."""
+
+    status = lib.SKEP_ERR_MEMORY
+
+
 class InternalError(Error, RuntimeError):
     """An error of the library itself; please report the text."""
 
     status = lib.SKEP_ERR_PANIC
 
 
-_KINDS = (ArgumentError, PoisonedError, Cancelled, FileError, CapacityError, InternalError)
+_KINDS = (
+    ArgumentError,
+    PoisonedError,
+    Cancelled,
+    FileError,
+    CapacityError,
+    NotEnoughMemoryError,
+    InternalError,
+)
 _BY_STATUS: dict[int, type[Error]] = {kind.status: kind for kind in _KINDS}
 
 
