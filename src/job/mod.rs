@@ -13,6 +13,7 @@ mod fingerprint;
 mod folder;
 mod fuse;
 mod manifest;
+mod maps;
 mod meter;
 mod needs;
 mod photograph;
@@ -23,7 +24,7 @@ mod task;
 use crate::error::{Error, Result};
 use crate::fusion::{fuse_input, overlaps};
 use crate::geometry::DepthRange;
-use crate::io::{CloudWriter, ColmapModel, SceneFolder, Workspace, visibility_path};
+use crate::io::{CloudWriter, SceneFolder, Workspace, visibility_path};
 use crate::memory::require_memory;
 use crate::options::Options;
 use crate::parallel::{JoinedPool, ProgressFn, useful_threads};
@@ -34,6 +35,7 @@ use folder::{Access, RunFolder};
 use fuse::FinishedViews;
 use glam::DVec3;
 use manifest::Manifest;
+pub use maps::check_maps;
 pub use needs::Needs;
 use needs::{Least, Shares};
 pub use run::Summary;
@@ -385,28 +387,4 @@ impl Job {
         let visibility = visibility_path(&path);
         Ok((Content::Fuse(points), vec![path, visibility]))
     }
-}
-
-/// What of the maps in a folder does not belong to a scene: nothing if no run made them. For a run, files that
-/// are not what it wrote, as sentences.
-///
-/// # Errors
-/// A run that was made from another model.
-pub fn check_maps(folder: &Path, scene: &SceneFolder) -> Result<Vec<String>> {
-    let folder = RunFolder::new(folder);
-    let Some(manifest) = Manifest::read(&folder.manifest())? else { return Ok(Vec::new()) };
-    let model = ColmapModel::read(&scene.sparse)?;
-    if !manifest.is_of_model(&model) {
-        let problem =
-            format!("the maps in {} were made with other cameras, poses or points", folder.root().display());
-        return Err(Error::file(&scene.sparse, problem));
-    }
-    let run = manifest.run();
-    let damaged = |(view, image): (usize, &crate::io::ModelImage)| {
-        let Some(record) = Record::read(&folder, run, Task::Finish { view }) else {
-            return Some(format!("{} is not finished: its maps may be of another run", image.name));
-        };
-        record.verify(&folder).err().map(|error| error.to_string())
-    };
-    Ok(model.images.iter().enumerate().filter_map(damaged).collect())
 }

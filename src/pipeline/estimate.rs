@@ -76,6 +76,7 @@ pub struct OwnMaps<'a> {
 /// What the stages read of a view's own estimate: all but its surface, which other views read.
 #[derive(Clone, Copy)]
 pub(super) struct OwnEstimate<'a> {
+    pub at: Place,
     /// One for each pixel.
     pub planes: &'a [PixelEstimate],
     /// Work done for the view so far.
@@ -86,7 +87,7 @@ pub(super) struct OwnEstimate<'a> {
 
 impl<S> ViewEstimate<S> {
     pub(super) fn as_own(&self) -> OwnEstimate<'_> {
-        OwnEstimate { planes: self.planes(), counts: self.counts, cycles: &self.cycles }
+        OwnEstimate { at: self.at, planes: self.planes(), counts: self.counts, cycles: &self.cycles }
     }
 
     /// The view.

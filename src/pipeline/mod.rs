@@ -174,9 +174,7 @@ fn finish(
         let mut planes = stages::average_across_views(context, &problem, own.as_own());
         filled.write_to(&mut planes);
         stages::remove_speckles(context, at(view), &images.own, &mut planes);
-        stages::classify(context, at(view), &problem, own.as_own(), planes, &filled, &|units| {
-            advance(view, units)
-        })
+        stages::classify(context, &problem, own.as_own(), planes, &filled, &|units| advance(view, units))
     })?;
     Ok(results.into_vec())
 }

@@ -61,5 +61,5 @@ pub(super) fn finish(
     let filled = stages::recheck(context, &problem, filled, sources, advance)?;
     filled.write_to(&mut planes);
     stages::remove_speckles(context, at, &images.own, &mut planes);
-    stages::classify(context, at, &problem, own, planes, &filled, advance)
+    stages::classify(context, &problem, own, planes, &filled, advance)
 }

@@ -120,7 +120,6 @@ pub(in crate::pipeline) fn remove_speckles(
 /// of the sources.
 pub(in crate::pipeline) fn classify(
     context: &RunContext,
-    at: Place,
     problem: &Problem,
     own: OwnEstimate,
     mut planes: Vec<PixelEstimate>,
@@ -129,7 +128,7 @@ pub(in crate::pipeline) fn classify(
 ) -> Result<ViewResult> {
     let costs = ConfidenceTask {
         problem,
-        window: context.window(at.cycle),
+        window: context.window(own.at.cycle),
         cost: CostRules::new(&context.options, false),
         // A set that falls back to all views would hide that the plane is not visible in any.
         view_set: ViewRules::new(&context.options, 0),
@@ -143,7 +142,7 @@ pub(in crate::pipeline) fn classify(
     }
     let tolerance = depth_tolerance(context, own);
     let confidence = cross_view::confidence(context.level, problem, tolerance, &planes, &costs.cost);
-    let view = context.scaled(at);
+    let view = context.scaled(own.at);
     let status = status::classify(view, &planes, &costs, context.options.min_matched_views());
     let mut counts = own.counts;
     counts += costs.counts;
@@ -153,7 +152,7 @@ pub(in crate::pipeline) fn classify(
         status,
         cost: costs.cost,
         confidence,
-        sources: context.sources(at.view).to_vec(),
+        sources: context.sources(own.at.view).to_vec(),
         view_sets: costs.view_sets,
         counts,
         cycles: own.cycles.to_vec(),
