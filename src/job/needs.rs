@@ -27,9 +27,9 @@ const DECODE_BYTES: u64 = 12;
 /// Bytes of a view's maps, previews and points on disk for each pixel; 98 to 112 on photographs, by the size of
 /// the view sets.
 const MAP_BYTES: u64 = 115;
-/// Bytes of a view's checked estimate for each pixel, which stays until the cloud is written. Before there are
-/// maps the estimates take 70: of the cycle before, searched and checked.
-const ESTIMATE_BYTES: u64 = 22;
+/// Bytes of a view's checked estimate and its surface for each pixel, which stay until the cloud is written.
+/// Before there are maps the estimates take 86: of the cycle before, searched and checked.
+const ESTIMATE_BYTES: u64 = 30;
 /// CPU seconds for each unit of work and source view; measured on one core of a server with AVX2.
 const SECONDS_PER_UNIT: f64 = 1.9e-7;
 
