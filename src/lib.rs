@@ -188,6 +188,8 @@ pub mod fusion;
 pub mod geometry;
 pub mod image;
 #[cfg(feature = "io")]
+pub mod import;
+#[cfg(feature = "io")]
 pub mod io;
 #[cfg(feature = "io")]
 pub mod job;

@@ -3,6 +3,7 @@
 use crate::{assert_refused, camera, model, rewrite};
 use glam::DMat3;
 use skep::Result;
+use skep::geometry::Distortion;
 use skep::io::{ColmapModel, ModelImage};
 use std::fs::{read_to_string, remove_file, write};
 use std::path::Path;
@@ -142,16 +143,30 @@ fn windows_line_ends_are_no_part_of_names() {
 }
 
 #[test]
-fn distortion_is_refused_with_the_command_that_undistorts() {
-    let command = "colmap image_undistorter --image_path IMAGES --input_path SPARSE --output_path DIR";
-    let cameras = CAMERAS.replace("3 PINHOLE 6 4 8 8.25 3 2.25", "3 OPENCV 6 4 8 8.25 3 2.25 0 0 0 0");
+fn distortion_is_read_only_where_it_is_asked_for() {
+    let command = "image_undistorter";
+    let opencv = |k1: &str| {
+        CAMERAS.replace("3 PINHOLE 6 4 8 8.25 3 2.25", &format!("3 OPENCV 6 4 8 8.25 3 2.25 {k1} 0 0 0"))
+    };
+    assert_eq!(
+        read_texts(&opencv("0"), IMAGES, POINTS),
+        read_texts(CAMERAS, IMAGES, POINTS),
+        "no distortion"
+    );
+    let folder = tempdir().unwrap();
+    write(folder.path().join("cameras.txt"), opencv("0.1")).unwrap();
+    write(folder.path().join("images.txt"), IMAGES).unwrap();
+    let (model, lenses) = ColmapModel::read_with_lenses(folder.path()).unwrap();
+    assert_eq!(model.images, read_texts(CAMERAS, IMAGES, POINTS).unwrap().images);
+    assert_eq!(lenses, [Some(Distortion::brown(&[0.1], [0.0; 2])), None]);
+    let cameras = opencv("0.1");
     let parts = ["cameras.txt, line 3", "camera 3", "OPENCV", "PINHOLE", command];
     assert_refused(read_texts(&cameras, IMAGES, POINTS), &parts);
     let number = |number: u32| {
         read_changed("cameras.bin", move |bytes| bytes[12..16].copy_from_slice(&number.to_le_bytes()))
     };
     assert_refused(number(2), &["cameras.bin", "camera 1", "SIMPLE_RADIAL", command]);
-    assert_refused(number(4_000_000_000), &["number 4000000000", command]);
+    assert_refused(number(4_000_000_000), &["number 4000000000", "THIN_PRISM_FISHEYE"]);
 }
 
 #[test]

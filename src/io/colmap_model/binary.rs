@@ -1,9 +1,8 @@
 //! `cameras.bin`, `images.bin` and `points3D.bin`; all numbers are little-endian.
 
 use super::ColmapModel;
-use super::records::{
-    CameraRecord, Files, ImageRecord, Layout, PINHOLE_NUMBER, Pinhole, Place, PointRecord, Records,
-};
+use super::camera_models::{CameraModel, PINHOLE_NUMBER};
+use super::records::{CameraRecord, Files, ImageRecord, Layout, Place, PointRecord, Records};
 use crate::error::Result;
 use crate::io::files::{FileReader, write_file};
 use std::io::{self, Write};
@@ -40,16 +39,13 @@ fn read_records<T>(path: &Path, record: fn(&mut FileReader, &Path) -> Result<T>)
 fn camera(file: &mut FileReader, path: &Path) -> Result<CameraRecord> {
     let id = file.u32("a camera's id")?;
     let model = file.u32("a camera's model")?;
-    let model = Pinhole::by_number(model, id, &Place { path, line: None })?;
+    let model = CameraModel::by_number(model, id, &Place { path, line: None })?;
     let (width, height) = (file.u64("a camera's width")?, file.u64("a camera's height")?);
-    let parameters = match model {
-        Pinhole::Simple => {
-            let [f, cx, cy] = file.f64s("a camera's f cx cy")?;
-            [f, f, cx, cy]
-        }
-        Pinhole::Full => file.f64s("a camera's fx fy cx cy")?,
-    };
-    Ok(CameraRecord { line: None, id, width, height, parameters })
+    let mut parameters = Vec::new();
+    for _ in 0..model.parameters {
+        parameters.extend(file.f64s::<1>("a camera's parameters")?);
+    }
+    Ok(CameraRecord { line: None, id, width, height, model, parameters })
 }
 
 fn image(file: &mut FileReader, _: &Path) -> Result<ImageRecord> {

@@ -1,14 +1,15 @@
 //! COLMAP's sparse models: cameras, poses and points, in its text and its binary layout.
 
 mod binary;
+mod camera_models;
 mod records;
 mod text;
 
 use crate::error::{Error, Result};
-use crate::geometry::Camera;
+use crate::geometry::{Camera, Distortion};
 use crate::memory::require_memory;
 use crate::scene::SparsePoint;
-use records::Files;
+use records::{Files, Records};
 use std::path::Path;
 
 /// An image of a model: its name, calibration and pose.
@@ -57,16 +58,20 @@ impl ColmapModel {
     /// exist; names that lead outside the folder of images; sizes of 0 and numbers that are not finite; a
     /// zero quaternion; truncated files and files with trailing bytes; a model without images.
     pub fn read(folder: &Path) -> Result<ColmapModel> {
-        let Some(files) = Files::find(folder) else {
-            let wanted =
-                "neither cameras.bin and images.bin nor cameras.txt and images.txt are in this folder";
-            return Err(Error::file(folder, format!("no COLMAP model: {wanted}")));
-        };
-        require_memory(MEMORY_PER_BYTE * files.bytes(), format!("the model in {}", folder.display()))?;
-        let records = if files.binary { binary::read(&files)? } else { text::read(&files)? };
-        records.resolve(&files)
+        let (files, records) = read_records(folder)?;
+        records.require_pinhole(&files)?;
+        Ok(records.resolve(&files)?.0)
     }
 
+    /// Like [`ColmapModel::read`], for any lens: gives the distortion of each image beside the model, in which
+    /// the cameras are those without their lenses.
+    ///
+    /// # Errors
+    /// The errors of [`ColmapModel::read`], but for the distortion.
+    pub fn read_with_lenses(folder: &Path) -> Result<(ColmapModel, Vec<Option<Distortion>>)> {
+        let (files, records) = read_records(folder)?;
+        records.resolve(&files)
+    }
     /// Writes `cameras.txt`, `images.txt` and `points3D.txt`. Points get the projections of their positions
     /// as features, gray as color and 0 as error.
     ///
@@ -81,4 +86,15 @@ impl ColmapModel {
     pub fn write_binary(&self, folder: &Path) -> Result<()> {
         binary::write(self, folder)
     }
+}
+
+/// Reads the files of a model.
+fn read_records(folder: &Path) -> Result<(Files, Records)> {
+    let Some(files) = Files::find(folder) else {
+        let wanted = "neither cameras.bin and images.bin nor cameras.txt and images.txt are in this folder";
+        return Err(Error::file(folder, format!("no COLMAP model: {wanted}")));
+    };
+    require_memory(MEMORY_PER_BYTE * files.bytes(), format!("the model in {}", folder.display()))?;
+    let records = if files.binary { binary::read(&files)? } else { text::read(&files)? };
+    Ok((files, records))
 }

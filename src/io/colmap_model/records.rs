@@ -1,8 +1,9 @@
 //! The records of a model's files before ids are resolved, and the checks that text and binary share.
 
+use super::camera_models::CameraModel;
 use super::{ColmapModel, ModelImage};
 use crate::error::{Error, Result};
-use crate::geometry::Camera;
+use crate::geometry::{Camera, Distortion, Lens};
 use crate::io::files::{NAME_INSIDE, stays_inside};
 use crate::scene::SparsePoint;
 use glam::{DMat3, DQuat, DVec2, DVec3};
@@ -12,26 +13,6 @@ use std::path::{Path, PathBuf};
 
 /// Pixels: COLMAP has the center of the top-left pixel at (0.5, 0.5), the crate at (0, 0).
 const HALF_PIXEL: f64 = 0.5;
-
-/// COLMAP's camera models in the order of their numbers in binary files.
-const MODELS: [&str; 12] = [
-    "SIMPLE_PINHOLE",
-    "PINHOLE",
-    "SIMPLE_RADIAL",
-    "RADIAL",
-    "OPENCV",
-    "OPENCV_FISHEYE",
-    "FULL_OPENCV",
-    "FOV",
-    "SIMPLE_RADIAL_FISHEYE",
-    "RADIAL_FISHEYE",
-    "THIN_PRISM_FISHEYE",
-    "RAD_TAN_THIN_PRISM_FISHEYE",
-];
-/// The number of PINHOLE in binary files, the only model that is written.
-pub(super) const PINHOLE_NUMBER: u32 = 1;
-
-const UNDISTORT: &str = "colmap image_undistorter --image_path IMAGES --input_path SPARSE --output_path DIR";
 
 /// The three files of a model.
 pub(super) struct Files {
@@ -82,37 +63,9 @@ pub(super) struct CameraRecord {
     pub id: u32,
     pub width: u64,
     pub height: u64,
-    /// fx, fy, cx, cy as in the file.
-    pub parameters: [f64; 4],
-}
-
-/// The supported camera models.
-#[derive(Clone, Copy)]
-pub(super) enum Pinhole {
-    /// f, cx, cy
-    Simple,
-    /// fx, fy, cx, cy
-    Full,
-}
-
-impl Pinhole {
-    pub(super) fn by_name(name: &str, camera: u32, place: &Place) -> Result<Pinhole> {
-        match name {
-            "SIMPLE_PINHOLE" => Ok(Pinhole::Simple),
-            "PINHOLE" => Ok(Pinhole::Full),
-            _ => Err(place.error(format!(
-                "camera {camera} has the model {name}; expected PINHOLE or SIMPLE_PINHOLE; undistort the \
-                 photographs first: `{UNDISTORT}`"
-            ))),
-        }
-    }
-
-    pub(super) fn by_number(number: u32, camera: u32, place: &Place) -> Result<Pinhole> {
-        match MODELS.get(number as usize) {
-            Some(name) => Pinhole::by_name(name, camera, place),
-            None => Pinhole::by_name(&format!("number {number}"), camera, place),
-        }
-    }
+    pub model: CameraModel,
+    /// As many as the model has, as in the file.
+    pub parameters: Vec<f64>,
 }
 
 /// An image's pose.
@@ -142,8 +95,23 @@ pub(super) struct Records {
 }
 
 impl Records {
-    /// Replaces ids by cameras and indices.
-    pub(super) fn resolve(self, files: &Files) -> Result<ColmapModel> {
+    /// Returns an error for a camera whose lens distorts.
+    pub(super) fn require_pinhole(&self, files: &Files) -> Result<()> {
+        for record in &self.cameras {
+            if record.model.calibration(&record.parameters).1.is_some() {
+                let place = Place { path: &files.cameras, line: record.line };
+                return Err(place.error(format!(
+                    "camera {} has the model {}; expected PINHOLE or SIMPLE_PINHOLE, or no distortion; \
+                     `skep reconstruct` undistorts photographs, as does `colmap image_undistorter`",
+                    record.id, record.model.name
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// Replaces ids by cameras and indices; gives the distortion of each image beside the model.
+    pub(super) fn resolve(self, files: &Files) -> Result<(ColmapModel, Vec<Option<Distortion>>)> {
         let mut cameras = HashMap::new();
         for record in &self.cameras {
             let place = Place { path: &files.cameras, line: record.line };
@@ -156,7 +124,7 @@ impl Records {
         }
         let mut indices = HashMap::new();
         let mut names = HashSet::new();
-        let mut images = Vec::new();
+        let (mut images, mut distortions) = (Vec::new(), Vec::new());
         for record in self.images {
             let place = Place { path: &files.images, line: record.line };
             let Some(camera) = cameras.get(&record.camera) else {
@@ -168,7 +136,8 @@ impl Records {
             if indices.insert(record.id, images.len() as u32).is_some() {
                 return Err(place.error(format!("image {} occurs twice", record.id)));
             }
-            let image = record.image(camera, &place)?;
+            let image = record.image(&camera.camera, &place)?;
+            distortions.push(camera.distortion);
             if !names.insert(image.name.clone()) {
                 return Err(place.error(format!("the name {} occurs twice", image.name)));
             }
@@ -191,15 +160,15 @@ impl Records {
             views.dedup();
             points.push(SparsePoint { position: DVec3::from(record.position), views });
         }
-        Ok(ColmapModel { images, points })
+        Ok((ColmapModel { images, points }, distortions))
     }
 }
 
 impl CameraRecord {
     /// The camera without its pose.
-    fn camera(&self, place: &Place) -> Result<Camera> {
+    fn camera(&self, place: &Place) -> Result<Lens> {
         let side = |side: u64| u32::try_from(side).unwrap_or(u32::MAX);
-        let [fx, fy, cx, cy] = self.parameters;
+        let ([fx, fy, cx, cy], distortion) = self.model.calibration(&self.parameters);
         let camera = Camera {
             width: side(self.width),
             height: side(self.height),
@@ -210,8 +179,9 @@ impl CameraRecord {
             rotation: DMat3::IDENTITY,
             translation: DVec3::ZERO,
         };
-        camera.check(&format!("camera {}", self.id)).map_err(|error| place.error(error))?;
-        Ok(camera)
+        let lens = Lens { camera, distortion };
+        lens.check(&format!("camera {}", self.id)).map_err(|error| place.error(error))?;
+        Ok(lens)
     }
 }
 

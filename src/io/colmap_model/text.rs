@@ -1,7 +1,8 @@
 //! `cameras.txt`, `images.txt` and `points3D.txt`.
 
 use super::ColmapModel;
-use super::records::{CameraRecord, Files, ImageRecord, Layout, Pinhole, Place, PointRecord, Records};
+use super::camera_models::CameraModel;
+use super::records::{CameraRecord, Files, ImageRecord, Layout, Place, PointRecord, Records};
 use crate::error::Result;
 use crate::io::files::{cannot_be_read, write_file};
 use std::io::Write;
@@ -24,17 +25,14 @@ fn read_cameras(path: &Path) -> Result<Vec<CameraRecord>> {
 fn camera(mut fields: Fields) -> Result<CameraRecord> {
     let id = fields.whole("the camera's id")?;
     let model = fields.word("the camera's model")?;
-    let model = Pinhole::by_name(model, id, &fields.place)?;
+    let model = CameraModel::by_name(model, id, &fields.place)?;
     let (width, height) = (fields.whole("the width")?, fields.whole("the height")?);
-    let parameters = match model {
-        Pinhole::Simple => {
-            let [f, cx, cy] = fields.numbers("f cx cy")?;
-            [f, f, cx, cy]
-        }
-        Pinhole::Full => fields.numbers("fx fy cx cy")?,
-    };
+    let mut parameters = Vec::new();
+    for _ in 0..model.parameters {
+        parameters.extend(fields.numbers::<1>("the camera's parameters")?);
+    }
     fields.finish()?;
-    Ok(CameraRecord { line: fields.place.line, id, width, height, parameters })
+    Ok(CameraRecord { line: fields.place.line, id, width, height, model, parameters })
 }
 
 fn read_images(path: &Path) -> Result<Vec<ImageRecord>> {
