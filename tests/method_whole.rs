@@ -381,9 +381,9 @@ fn masked_pixels_get_no_estimate_but_serve_other_views() {
     let width = procedural::SIZE.0 as usize;
     let is_masked = |pixel: usize| pixel % width < width / 2;
     let pixels = made.views[MIDDLE].camera.pixels();
-    made.views[MIDDLE].mask = Some((0..pixels).map(|pixel| !is_masked(pixel)).collect());
+    made.views[MIDDLE].mask = Some((0..pixels).map(|pixel| !is_masked(pixel)).collect::<Vec<_>>().into());
     // A mask that excludes every pixel.
-    made.views[0].mask = Some(vec![false; pixels]);
+    made.views[0].mask = Some(vec![false; pixels].into());
     let result = run(&made, &options());
 
     for pixel in 0..pixels {

@@ -162,7 +162,7 @@ pub unsafe extern "C" fn skep_scene_set_mask(
                     let size = (view.camera.width, view.camera.height);
                     // SAFETY: as the header demands of the caller.
                     let mask = unsafe { maps::read(mask_or_null, size, stride_bytes, "mask") }?;
-                    Some(mask.into_iter().map(|wanted| wanted != 0).collect())
+                    Some(mask.into_iter().map(|wanted| wanted != 0).collect::<Vec<_>>().into())
                 }
             };
             Ok(())

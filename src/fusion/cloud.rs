@@ -1,5 +1,7 @@
 //! Fused points.
 
+use glam::DVec3;
+
 /// Fused points.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PointCloud {
@@ -11,6 +13,22 @@ pub struct PointCloud {
     pub colors: Vec<[u8; 3]>,
     /// The views each point was fused from, as indices into the scene; first the one it started in.
     pub views: PointViews,
+}
+
+impl PointCloud {
+    /// The points whose positions are wanted.
+    pub(crate) fn filtered(&self, is_wanted: impl Fn(DVec3) -> bool) -> PointCloud {
+        let mut kept = PointCloud::default();
+        for (point, &position) in self.positions.iter().enumerate() {
+            if is_wanted(position.into()) {
+                kept.positions.push(position);
+                kept.normals.push(self.normals[point]);
+                kept.colors.push(self.colors[point]);
+                kept.views.push(self.views.get(point));
+            }
+        }
+        kept
+    }
 }
 
 /// A list of views for each point, in one allocation.

@@ -11,10 +11,16 @@
 //! | write the workspace, once | `prepare.rs` |
 
 mod formats;
+mod photograph;
+mod prepare;
+mod record;
+mod selection;
+mod source_lists;
 
 use crate::geometry::{DepthRange, Lens};
 use crate::scene::SparsePoint;
 pub use formats::read;
+pub(crate) use prepare::{Extra, Prepared, prepare};
 use std::path::PathBuf;
 
 /// A calibrated scene of any program.

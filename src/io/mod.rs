@@ -6,6 +6,7 @@
 mod colmap_maps;
 mod colmap_model;
 mod files;
+mod picture_formats;
 mod pictures;
 mod ply;
 mod previews;
@@ -20,6 +21,10 @@ pub use colmap_model::{ColmapModel, ModelImage};
 pub use files::write_file;
 pub(crate) use files::{
     cannot_be_read, cannot_be_written, link_or_copy, remove_temporary_files, stays_inside,
+};
+pub(crate) use picture_formats::{
+    deep_picture_from_bytes, largest_value, opaque_pixels, picture_header, read_mask, write_mask,
+    write_photograph,
 };
 pub(crate) use pictures::picture_from_bytes;
 pub use pictures::{picture_size, read_picture, write_picture};

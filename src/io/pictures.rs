@@ -25,15 +25,7 @@ pub(crate) fn picture_from_bytes(bytes: &[u8], path: &Path) -> Result<Picture> {
 }
 
 fn decode<R: BufRead + Seek>(reader: ImageReader<R>, path: &Path) -> Result<Picture> {
-    let decoder = reader.into_decoder().and_then(|mut decoder| {
-        decoder.set_limits(limits())?;
-        Ok(decoder)
-    });
-    let decoder = decoder.map_err(|error| cannot_be_read(path, error))?;
-    let (width, height) = decoder.dimensions();
-    // The decoded pixels, then their gray values and colors.
-    let bytes = decoder.total_bytes() + 4 * u64::from(width) * u64::from(height);
-    require_memory(bytes, format!("the photograph {}", path.display()))?;
+    let decoder = decoder(reader, path)?;
     let image = DynamicImage::from_decoder(decoder).map_err(|error| cannot_be_read(path, error))?;
     let (width, height) = (image.width(), image.height());
     if is_gray(&image) {
@@ -59,7 +51,23 @@ pub fn write_picture(path: &Path, picture: &Picture) -> Result<()> {
     })
 }
 
-fn is_gray(image: &DynamicImage) -> bool {
+/// The decoder of a file, if there is memory for its pixels, their gray values and colors.
+pub(super) fn decoder<'a, R: BufRead + Seek + 'a>(
+    reader: ImageReader<R>,
+    path: &Path,
+) -> Result<Box<dyn ImageDecoder + 'a>> {
+    let opened = reader.into_decoder().and_then(|mut decoder| {
+        decoder.set_limits(limits())?;
+        Ok(decoder)
+    });
+    let decoder = opened.map_err(|error| cannot_be_read(path, error))?;
+    let (width, height) = decoder.dimensions();
+    let bytes = decoder.total_bytes() + 4 * u64::from(width) * u64::from(height);
+    require_memory(bytes, format!("the photograph {}", path.display()))?;
+    Ok(Box::new(decoder))
+}
+
+pub(super) fn is_gray(image: &DynamicImage) -> bool {
     matches!(image.color(), ColorType::L8 | ColorType::La8 | ColorType::L16 | ColorType::La16)
 }
 
@@ -69,7 +77,7 @@ fn open(path: &Path) -> Result<ImageReader<BufReader<File>>> {
     Ok(limited(reader.map_err(|error| cannot_be_read(path, error))?))
 }
 
-fn limited<R: BufRead + Seek>(mut reader: ImageReader<R>) -> ImageReader<R> {
+pub(super) fn limited<R: BufRead + Seek>(mut reader: ImageReader<R>) -> ImageReader<R> {
     reader.limits(limits());
     reader
 }

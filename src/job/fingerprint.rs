@@ -10,13 +10,13 @@ use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
 /// Length and XXH3 (64 bits) of a content.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Fingerprint {
+pub(crate) struct Fingerprint {
     pub bytes: u64,
     pub xxh3: String,
 }
 
 /// The fingerprint of some bytes.
-pub(super) fn fingerprint(bytes: &[u8]) -> Fingerprint {
+pub(crate) fn fingerprint(bytes: &[u8]) -> Fingerprint {
     Fingerprint { bytes: bytes.len() as u64, xxh3: text(xxh3_64(bytes)) }
 }
 
@@ -24,7 +24,7 @@ pub(super) fn fingerprint(bytes: &[u8]) -> Fingerprint {
 ///
 /// # Errors
 /// A file that cannot be read.
-pub(super) fn fingerprint_file(path: &Path) -> Result<Fingerprint> {
+pub(crate) fn fingerprint_file(path: &Path) -> Result<Fingerprint> {
     let error = |error| cannot_be_read(path, error);
     let mut file = File::open(path).map_err(error)?;
     let (mut hash, mut bytes, mut buffer) = (Xxh3::new(), 0, vec![0; 1 << 16]);

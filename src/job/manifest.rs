@@ -34,6 +34,21 @@ pub(super) struct Manifest {
 pub(super) struct PhotographEntry {
     pub name: String,
     pub content: Fingerprint,
+    /// Its mask, if it has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mask: Option<Fingerprint>,
+    /// Its depth range, if the scene says so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_range: Option<[f64; 2]>,
+    /// Its source views, if the scene says so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sources: Option<Vec<u32>>,
+}
+
+impl PhotographEntry {
+    pub(super) fn depth_range(&self) -> Option<DepthRange> {
+        self.depth_range.map(|[near, far]| DepthRange { near, far })
+    }
 }
 
 impl Manifest {
@@ -118,14 +133,17 @@ impl Manifest {
         if self.model != earlier.model {
             found.push("the model (cameras, poses or points)".to_owned());
         }
-        let named = |manifest: &Manifest| -> BTreeMap<String, Fingerprint> {
-            let entry = |entry: &PhotographEntry| (entry.name.clone(), entry.content.clone());
+        let named = |manifest: &Manifest| -> BTreeMap<String, PhotographEntry> {
+            let entry = |entry: &PhotographEntry| (entry.name.clone(), entry.clone());
             manifest.photographs.iter().map(entry).collect()
         };
         let (before, after) = (named(earlier), named(self));
         let changed =
             after.iter().filter(|(name, content)| before.get(*name).is_some_and(|old| old != *content));
-        let changed = changed.map(|(name, _)| format!("photograph {name}"));
+        let changed = changed.map(|(name, entry)| {
+            let is_other = before.get(name).is_some_and(|old| old.content != entry.content);
+            format!("{} {name}", if is_other { "photograph" } else { "mask, depth range or sources of" })
+        });
         let added = after
             .keys()
             .filter(|name| !before.contains_key(*name))
@@ -173,8 +191,10 @@ mod tests {
     use crate::job::fingerprint::fingerprint;
 
     fn manifest() -> Manifest {
-        let photograph =
-            |name: &str| PhotographEntry { name: name.to_owned(), content: fingerprint(name.as_bytes()) };
+        let photograph = |name: &str| {
+            let content = fingerprint(name.as_bytes());
+            PhotographEntry { name: name.to_owned(), content, mask: None, depth_range: None, sources: None }
+        };
         let photographs = ["a.png", "b.png"].map(photograph).to_vec();
         Manifest::new(&ColmapModel::default(), photographs, None, &Options::default())
     }

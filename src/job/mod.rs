@@ -24,13 +24,15 @@ mod task;
 use crate::error::{Error, Result};
 use crate::fusion::{fuse_input, overlaps};
 use crate::geometry::DepthRange;
-use crate::io::{CloudWriter, SceneFolder, Workspace, visibility_path};
+use crate::import::prepare;
+use crate::io::{CloudWriter, Workspace, visibility_path};
 use crate::memory::require_memory;
 use crate::options::Options;
 use crate::parallel::{JoinedPool, ProgressFn, useful_threads};
 use crate::pipeline::{Checked, CheckedEstimates, CycleRecord, Stepper, ViewEstimate, thread_count};
-use crate::scene::Scene;
+use crate::scene::{Scene, is_inside};
 use estimates::Estimates;
+pub(crate) use fingerprint::{Fingerprint, fingerprint, fingerprint_file};
 use folder::{Access, RunFolder};
 use fuse::FinishedViews;
 use glam::DVec3;
@@ -77,8 +79,10 @@ pub struct Job {
 
 impl Job {
     /// Plans the run of a scene in a folder, which is created: reads model and photographs and puts them into
-    /// the folder. A run of the same photographs, model, options and version that began there goes on, unless
-    /// `fresh`; anything else begins anew, and [`Job::notices`] tells why. The options `threads` and `memory`
+    /// the folder. The scene is a folder or file of any format that [`crate::import`] reads; photographs are
+    /// undistorted and reduced as [`InputOptions`](crate::InputOptions) say. A run of the same photographs,
+    /// model, options and version that began there goes on, unless `fresh`; anything else begins anew, and
+    /// [`Job::notices`] tells why. The options `threads` and `memory`
     /// may change. No other process can work on the run while the job exists.
     ///
     /// # Errors
@@ -94,17 +98,18 @@ impl Job {
         progress: ProgressFn,
     ) -> Result<Job> {
         options.check()?;
-        let source = SceneFolder::find(scene)?;
         let folder = RunFolder::new(folder);
         let lock = folder.lock(Access::Whole)?;
         // How much work there is is known from the scene alone.
         let pool = JoinedPool::new(useful_threads(options.threads, usize::MAX))?;
-        let plan = pool.install(|| plan::read(&source, depth_range, options, progress))?;
+        let prepared = pool.install(|| prepare(scene, &options.input, folder.root(), progress))?;
+        let plan = pool.install(|| plan::read(&prepared, depth_range, options, progress))?;
         let run = plan.manifest.run();
         let mut job = pool.install(|| Job::new(folder, plan.scene, options, run, lock))?;
         job.needs.require(job.needs.least_memory)?;
         // Last: a run that cannot begin leaves the folder as it was.
-        job.notices = plan::prepare(&job.folder, &source, &job.scene, &plan.manifest, fresh)?;
+        job.notices = plan::prepare(&job.folder, &prepared.folder, &job.scene, &plan.manifest, fresh)?;
+        job.notices.splice(..0, prepared.warnings);
         Ok(job)
     }
 
@@ -382,7 +387,11 @@ impl Job {
         let views = FinishedViews::new(&self.scene, &self.workspace, &self.overlaps, limit);
         let path = self.workspace.cloud();
         let mut cloud = CloudWriter::new(&path)?;
-        fuse_input(&views, &self.options.fusion, progress, &mut |points| cloud.add(points))?;
+        let bounds = self.options.input.bounds()?;
+        fuse_input(&views, &self.options.fusion, progress, &mut |points| match bounds {
+            Some(bounds) => cloud.add(&points.filtered(|position| is_inside(bounds, position))),
+            None => cloud.add(points),
+        })?;
         let points = cloud.finish()?;
         let visibility = visibility_path(&path);
         Ok((Content::Fuse(points), vec![path, visibility]))

@@ -1,16 +1,17 @@
 //! The beginning of a run: the scene is read and compared with what the folder holds.
 
-use super::fingerprint::fingerprint;
+use super::fingerprint::{fingerprint, fingerprint_file};
 use super::folder::RunFolder;
 use super::manifest::{Manifest, PhotographEntry};
 use super::photograph::FilePhotograph;
 use super::task::Record;
 use crate::error::{Error, Result};
 use crate::geometry::DepthRange;
-use crate::image::Photograph;
+use crate::image::{Mask, Photograph};
+use crate::import::{Extra, Prepared};
 use crate::io::{
     ColmapModel, ModelImage, SceneFolder, Workspace, cannot_be_read, link_or_copy, picture_from_bytes,
-    remove_temporary_files,
+    read_mask, remove_temporary_files,
 };
 use crate::options::Options;
 use crate::parallel::{Phase, Progress, ProgressFn};
@@ -31,14 +32,12 @@ pub(super) struct Plan {
 /// # Errors
 /// A file that is missing, damaged, or not of its camera's size; [`Error::Cancelled`].
 pub(super) fn read(
-    folder: &SceneFolder,
+    prepared: &Prepared,
     depth_range: Option<DepthRange>,
     options: &Options,
     progress: ProgressFn,
 ) -> Result<Plan> {
-    if !folder.images.is_dir() {
-        return Err(Error::file(&folder.images, "no such folder; expected the photographs in it"));
-    }
+    let folder = &prepared.folder;
     let model = ColmapModel::read(&folder.sparse)?;
     let tracker = Tracker::with_work(progress, model.images.len() as u64);
     let advance = |units, view| {
@@ -52,7 +51,14 @@ pub(super) fn read(
         let bytes = std::fs::read(&path).map_err(|error| cannot_be_read(&path, error))?;
         picture_from_bytes(&bytes, &path)?;
         advance(1, view)?;
-        Ok(PhotographEntry { name: image.name.clone(), content: fingerprint(&bytes) })
+        let Extra { mask, depth_range, sources } = prepared.extras.get(view).cloned().unwrap_or_default();
+        Ok(PhotographEntry {
+            name: image.name.clone(),
+            content: fingerprint(&bytes),
+            mask: mask.as_deref().map(fingerprint_file).transpose()?,
+            depth_range: depth_range.map(|range| [range.near, range.far]),
+            sources,
+        })
     };
     let photographs: Vec<_> =
         model.images.par_iter().enumerate().with_max_len(1).map(entry).collect::<Result<_>>()?;
@@ -83,22 +89,31 @@ pub(super) fn read_planned(folder: &RunFolder, manifest: &Manifest, options: &Op
 }
 
 fn scene(folder: &SceneFolder, model: ColmapModel, manifest: &Manifest) -> Result<Scene> {
-    let view = |(image, entry): (ModelImage, &PhotographEntry)| {
+    let masks = folder.images.with_file_name("masks");
+    let view = |(image, entry): (ModelImage, &PhotographEntry)| -> Result<View> {
+        let mask = entry.mask.as_ref().map(|expected| {
+            let path = masks.join(format!("{}.png", image.name));
+            match fingerprint_file(&path)? == *expected {
+                true => read_mask(&path, (image.camera.width, image.camera.height)).map(Mask::from),
+                false => Err(Error::file(path, "the mask changed since the run began; plan the run again")),
+            }
+        });
         let photograph = FilePhotograph {
             path: folder.images.join(&image.name),
             size: (image.camera.width, image.camera.height),
             fingerprint: entry.content.clone(),
         };
-        View {
+        Ok(View {
             name: image.name,
             picture: Photograph::Deferred(Arc::new(photograph)),
             camera: image.camera,
-            mask: None,
-            depth_range: manifest.depth_range(),
-            sources: None,
-        }
+            mask: mask.transpose()?,
+            depth_range: manifest.depth_range().or(entry.depth_range()),
+            sources: entry.sources.clone(),
+        })
     };
-    Scene::new(model.images.into_iter().zip(&manifest.photographs).map(view).collect(), model.points)
+    let views = model.images.into_iter().zip(&manifest.photographs).map(view).collect::<Result<_>>()?;
+    Scene::new(views, model.points)
 }
 
 /// Prepares the folder for a run: one that it began before goes on, anything else begins anew. Returns what

@@ -4,6 +4,7 @@
 //! of a user are named constants at the top of the files that use them.
 
 mod groups;
+mod input;
 mod presets;
 mod schedule;
 mod value;
@@ -16,6 +17,8 @@ pub use groups::{
     CheckOptions, CostOptions, FusionOptions, RefineOptions, SearchOptions, ViewSelectionOptions,
     WindowOptions,
 };
+pub use input::InputOptions;
+use input::TextEntry;
 pub use schedule::{Scale, ScheduleOptions};
 use schedule::{scales_from_text, scales_to_text};
 #[cfg(feature = "capi")]
@@ -42,6 +45,8 @@ pub struct Options {
     /// Instruction set of the kernels; `None` takes the best that the machine supports. The result does not
     /// depend on it.
     pub simd: Option<SimdLevel>,
+    /// What is taken from a scene in files.
+    pub input: InputOptions,
     /// The scales and their cycles.
     pub schedule: ScheduleOptions,
     /// The patches.
@@ -70,23 +75,44 @@ const SEED: OptionInfo = OptionInfo {
     kind: Kind::Count { min: 0, max: u64::MAX },
 };
 
-const SIMD: OptionInfo = OptionInfo {
-    name: "simd",
+const SIMD: TextEntry = TextEntry {
+    c_name: c"simd",
     explanation: "Instruction set: scalar, baseline, v3, or best for the best the machine has; the result \
                   does not depend on it.",
     unit: "name",
-    kind: Kind::Text,
+    get: |options| options.simd.map_or(BEST, SimdLevel::name).to_owned(),
+    set: |options, text| {
+        let level = SimdLevel::ALL.into_iter().find(|level| level.name() == text);
+        if level.is_none() && text != BEST {
+            let names = SimdLevel::ALL.map(SimdLevel::name).join(", ");
+            return Err(Error::argument(
+                "options.simd",
+                format!("`{text}`"),
+                format!("one of {names}, {BEST}"),
+            ));
+        }
+        options.simd = level;
+        Ok(())
+    },
 };
 
-const SCALES: OptionInfo = OptionInfo {
-    name: "schedule.scales",
+const SCALES: TextEntry = TextEntry {
+    c_name: c"schedule.scales",
     explanation: "Scales from coarse to fine, each twice as large as the one before, the last at full size: \
                   `downscale=2 food_sources=3 iterations=5+4x1; downscale=1 food_sources=2 \
                   iterations=1+2x1` is half size with 3 food sources a pixel, 5 iterations in the first \
                   cycle and 4 more cycles of 1, then full size.",
     unit: "text",
-    kind: Kind::Text,
+    get: |options| scales_to_text(&options.schedule.scales),
+    set: |options, text| {
+        let before = std::mem::replace(&mut options.schedule.scales, scales_from_text(text)?);
+        options.check_scales().inspect_err(|_| options.schedule.scales = before)
+    },
 };
+
+fn texts() -> impl Iterator<Item = &'static TextEntry> {
+    [&SIMD].into_iter().chain(input::TEXTS).chain([&SCALES])
+}
 
 /// The option whose text may have a unit.
 const MEMORY: &str = "memory";
@@ -123,7 +149,7 @@ const OTHERS: &[Entry] = &[
 ];
 
 fn numbers() -> impl Iterator<Item = &'static Entry> {
-    OTHERS.iter().chain(GROUPED)
+    OTHERS.iter().chain(input::NUMBERS).chain(GROUPED)
 }
 
 impl Options {
@@ -133,6 +159,7 @@ impl Options {
     /// An option out of its range.
     pub fn check(&self) -> Result<()> {
         self.check_scales()?;
+        self.input.bounds()?;
         for entry in numbers() {
             entry.kind.check(entry.name(), (entry.get)(self))?;
         }
@@ -159,14 +186,17 @@ impl Options {
     /// All options, in the order in which they are listed: name, explanation, unit and values of each.
     pub fn infos() -> impl Iterator<Item = OptionInfo> {
         let [threads, memory, min_changed] = [0, 1, 2].map(|index: usize| OTHERS[index].info());
-        [SEED, threads, memory, SIMD, SCALES, min_changed].into_iter().chain(GROUPED.iter().map(Entry::info))
+        let input = input::NUMBERS.iter().map(Entry::info).chain(input::TEXTS.iter().map(TextEntry::info));
+        let of_run = [SEED, threads, memory, SIMD.info()].into_iter().chain(input);
+        of_run.chain([SCALES.info(), min_changed]).chain(GROUPED.iter().map(Entry::info))
     }
 
     /// The groups with a sentence on each, in the order of the options.
     pub fn groups() -> impl Iterator<Item = (&'static str, &'static str)> {
         let schedule = ("schedule", "Schedule: the scales of a run and the cycles on each.");
         let trimmed = |&(name, text): &(&'static str, &'static str)| (name, text.trim_start());
-        std::iter::once(schedule).chain(groups::GROUPS.iter().map(trimmed))
+        let input = ("input", "Input: what a run takes from a scene in files.");
+        [input, schedule].into_iter().chain(groups::GROUPS.iter().map(trimmed))
     }
 
     /// The description of the option of this name.
@@ -196,8 +226,9 @@ impl Options {
         Ok(match numbers().find(|entry| entry.name() == info.name) {
             Some(entry) => entry.value(self),
             None if info == SEED => OptionValue::Count(self.seed),
-            None if info == SIMD => OptionValue::Text(self.simd.map_or(BEST, SimdLevel::name).to_owned()),
-            None => OptionValue::Text(scales_to_text(&self.schedule.scales)),
+            None => OptionValue::Text(
+                texts().find(|entry| entry.info() == info).map(|entry| (entry.get)(self)).unwrap_or_default(),
+            ),
         })
     }
 
@@ -236,23 +267,10 @@ impl Options {
         };
         if info == SEED {
             self.seed = text.parse().map_err(|_| error(info.kind.to_string()))?;
-        } else if info == SIMD {
-            let level = SimdLevel::ALL.into_iter().find(|level| level.name() == text);
-            if level.is_none() && text != BEST {
-                return Err(error(format!(
-                    "one of {}, {BEST}",
-                    SimdLevel::ALL.map(SimdLevel::name).join(", ")
-                )));
-            }
-            self.simd = level;
         } else if info.name == MEMORY {
             self.set_number(MEMORY, parse_bytes(text)? as f64)?;
-        } else if info == SCALES {
-            let before = std::mem::replace(&mut self.schedule.scales, scales_from_text(text)?);
-            if let Err(error) = self.check_scales() {
-                self.schedule.scales = before;
-                return Err(error);
-            }
+        } else if let Some(entry) = texts().find(|entry| entry.info() == info) {
+            (entry.set)(self, text)?;
         } else {
             let value = match (info.kind, text) {
                 (Kind::Switch, "true") => 1.0,
@@ -273,9 +291,11 @@ impl Options {
     #[cfg(feature = "capi")]
     pub(crate) fn c_name(index: usize) -> Option<&'static CStr> {
         let name = Options::infos().nth(index)?.name;
-        let others = [(SEED, c"seed"), (SIMD, c"simd"), (SCALES, c"schedule.scales")];
-        let other = others.into_iter().find(|(info, _)| info.name == name).map(|(_, c_name)| c_name);
-        other.or_else(|| numbers().find(|entry| entry.name() == name).map(|entry| entry.c_name))
+        if name == SEED.name {
+            return Some(c"seed");
+        }
+        let text = texts().find(|entry| entry.info().name == name).map(|entry| entry.c_name);
+        text.or_else(|| numbers().find(|entry| entry.name() == name).map(|entry| entry.c_name))
     }
 }
 

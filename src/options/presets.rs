@@ -1,8 +1,8 @@
 //! The presets.
 
 use super::{
-    CheckOptions, CostOptions, FusionOptions, Options, RefineOptions, Scale, ScheduleOptions, SearchOptions,
-    ViewSelectionOptions, WindowOptions,
+    CheckOptions, CostOptions, FusionOptions, InputOptions, Options, RefineOptions, Scale, ScheduleOptions,
+    SearchOptions, ViewSelectionOptions, WindowOptions,
 };
 use crate::error::{Error, Result};
 
@@ -31,6 +31,7 @@ impl Options {
             threads: 0,
             memory: 0,
             simd: None,
+            input: InputOptions::default(),
             schedule: ScheduleOptions {
                 // FoodNumber is the paper's; it never gives its numbers of iterations and cycles.
                 scales: vec![scale(1, 10, 20, (3, 2))],

@@ -56,6 +56,8 @@ impl RunContext {
     /// An option out of its range, named.
     pub(super) fn with_image_limit(scene: &Scene, options: &Options, limit: usize) -> Result<RunContext> {
         options.check()?;
+        let bounded = options.input.bounds()?.map(|bounds| scene.bounded(bounds));
+        let scene = bounded.as_ref().unwrap_or(scene);
         let scales = &options.schedule.scales;
         let views = || (0..scene.views().len()).into_par_iter();
         let scaled =

@@ -2,6 +2,7 @@
 
 use crate::ambc::Confidence;
 use crate::geometry::SearchRange;
+use crate::image::Mask;
 use crate::scene::{PixelEstimate, PixelStatus, ScaledView};
 
 /// Relative distance to an end of the depth range within which a depth counts as limited by it.
@@ -17,8 +18,9 @@ pub(super) fn classify(
 ) -> Vec<PixelStatus> {
     let SearchRange { near, far } = view.range.into();
     let is_at_end = |depth: f32| depth < near * (1.0 + AT_RANGE_END) || depth > far * (1.0 - AT_RANGE_END);
+    let mask = view.mask.as_ref().map(Mask::to_vec);
     let status = |(pixel, plane): (usize, &PixelEstimate)| {
-        if view.mask.as_ref().is_some_and(|mask| !mask[pixel]) {
+        if mask.as_ref().is_some_and(|mask| !mask[pixel]) {
             PixelStatus::Masked
         } else if plane.validated {
             PixelStatus::Validated
@@ -76,8 +78,12 @@ mod tests {
         (map.planes[8].validated, expected[8]) = (true, PixelStatus::Validated);
         confidence.has_texture[8] = false;
 
-        let view =
-            ScaledView { camera: world.cameras[0], mask: Some(mask), range: RANGE, likely_range: RANGE };
+        let view = ScaledView {
+            camera: world.cameras[0],
+            mask: Some(mask.into()),
+            range: RANGE,
+            likely_range: RANGE,
+        };
         assert_eq!(classify(&view, &map.planes, &confidence, 2), expected);
         // With a single source no pixel can be validated, for this reason.
         map.planes.iter_mut().for_each(|plane| plane.validated = false);

@@ -1,5 +1,6 @@
 //! The input of a run: views with image, camera, mask and depth range, and sparse points.
 
+mod bounds;
 mod compact_plane;
 mod depth_ranges;
 mod image_cache;
@@ -11,7 +12,8 @@ mod tracks;
 
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, DepthRange};
-use crate::image::Photograph;
+use crate::image::{Mask, Photograph};
+pub(crate) use bounds::is_inside;
 pub(crate) use compact_plane::CompactPlane;
 use depth_ranges::{DepthRanges, depth_ranges};
 use glam::DVec3;
@@ -33,7 +35,7 @@ pub struct View {
     pub camera: Camera,
     /// `true` where a depth is estimated, one value for each pixel, row by row; `None` estimates all. Other
     /// views are matched with masked pixels too.
-    pub mask: Option<Vec<bool>>,
+    pub mask: Option<Mask>,
     /// The depth range of the search; `None` derives it from the sparse points.
     pub depth_range: Option<DepthRange>,
     /// The views to match it with, as indices into the scene's views, the most important first; `None`
@@ -160,10 +162,10 @@ fn check_view(view: &View, name: &str) -> Result<()> {
         return Err(Error::argument(format!("{name}.picture"), format!("{width}x{height}"), expected));
     }
     if let Some(mask) = &view.mask
-        && mask.len() != view.camera.pixels()
+        && mask.pixels() != view.camera.pixels()
     {
         let expected = format!("one for each of the {} pixels", view.camera.pixels());
-        return Err(Error::argument(format!("{name}.mask"), format!("{} values", mask.len()), expected));
+        return Err(Error::argument(format!("{name}.mask"), format!("{} values", mask.pixels()), expected));
     }
     match view.depth_range {
         Some(range) => range.check(&format!("{name}.depth_range")),

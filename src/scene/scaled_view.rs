@@ -2,7 +2,7 @@
 
 use crate::geometry::Camera;
 use crate::geometry::DepthRange;
-use crate::image::halve_mask;
+use crate::image::{Mask, halve_mask};
 use crate::scene::Scene;
 
 /// A view reduced to one scale, its image excepted.
@@ -11,7 +11,7 @@ pub(crate) struct ScaledView {
     /// Its camera on this scale.
     pub camera: Camera,
     /// `true` where a depth is estimated: where the mask is set in any of the pixels of full size.
-    pub mask: Option<Vec<bool>>,
+    pub mask: Option<Mask>,
     /// The range that depths are limited to.
     pub range: DepthRange,
     /// The part of it in which most surfaces are.
@@ -24,12 +24,12 @@ impl ScaledView {
         let view = &scene.views()[index];
         let (range, likely_range) = (scene.outer_range(index), scene.depth_range(index));
         let mut camera = view.camera;
-        let mut mask = view.mask.clone();
+        let mut mask = view.mask.as_ref().map(Mask::to_vec);
         for _ in 0..downscale.trailing_zeros() {
             mask = mask.map(|mask| halve_mask(&mask, &camera));
             camera = camera.halved();
         }
-        ScaledView { camera, mask, range, likely_range }
+        ScaledView { camera, mask: mask.map(Mask::from), range, likely_range }
     }
 }
 
@@ -56,7 +56,7 @@ mod tests {
             name: name.to_owned(),
             picture: Picture::from_gray(5, 3, (0..15).map(|pixel| pixel * 10).collect()).unwrap().into(),
             camera,
-            mask: Some((0..15).map(|pixel| pixel == set_pixel).collect()),
+            mask: Some((0..15).map(|pixel| pixel == set_pixel).collect::<Vec<_>>().into()),
             depth_range: Some(DepthRange { near: 1.0, far: 2.0 }),
             sources: None,
         };
@@ -70,7 +70,7 @@ mod tests {
             for level in 0..4usize {
                 let view = ScaledView::of(&scene(set_pixel), 0, 1 << level);
                 let width = view.camera.width as usize;
-                let mask = view.mask.as_ref().unwrap();
+                let mask = view.mask.as_ref().unwrap().to_vec();
                 assert_eq!(mask.len(), view.camera.pixels());
                 let expected = (y >> level) * width + (x >> level);
                 assert!((0..mask.len()).all(|pixel| mask[pixel] == (pixel == expected)));

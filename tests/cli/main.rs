@@ -2,6 +2,7 @@
 #![cfg(feature = "cli")]
 
 mod dump;
+mod import;
 #[cfg(unix)]
 mod interruption;
 mod layouts;

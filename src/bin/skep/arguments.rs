@@ -37,7 +37,8 @@ pub enum Command {
 
 #[derive(Args)]
 pub struct Run {
-    /// Folder with images/ and a COLMAP model in sparse/ or sparse/0/
+    /// Folder with images/ and a COLMAP model in sparse/ or sparse/0/, of any camera model; or a scene of
+    /// another program (`skep help reconstruct` lists them)
     pub scene: PathBuf,
     /// Folder of the results [default: SCENE/dense]
     #[arg(short, long, value_name = "DIR")]
@@ -56,6 +57,8 @@ pub struct Run {
     /// Depth range to search in every view, in units of the model, instead of that of the sparse points
     #[arg(long, num_args = 2, value_names = ["MIN", "MAX"], allow_negative_numbers = true)]
     depth_range: Option<Vec<f64>>,
+    #[command(flatten)]
+    input: Input,
     /// Parts of the method to leave out, separated by commas
     #[arg(long, value_name = "PARTS", value_delimiter = ',')]
     without: Vec<Part>,
@@ -81,6 +84,48 @@ pub struct Run {
     /// Print warnings and errors only
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// What is taken from the scene.
+#[derive(Args)]
+pub struct Input {
+    /// Reduce photographs whose longer side has more pixels; the maps have the reduced size
+    #[arg(long, value_name = "PIXELS")]
+    max_image_size: Option<u32>,
+    /// Photographs to take: names or patterns with * and ?, separated by commas, or a file with one on each
+    /// line
+    #[arg(long, value_name = "NAMES|FILE")]
+    images: Option<String>,
+    /// Folder of masks, NAME.png for the photograph NAME: where a mask is 0, nothing is estimated
+    #[arg(long, value_name = "DIR")]
+    masks: Option<String>,
+    /// Ignore pixels of alpha 0 like masked ones
+    #[arg(long)]
+    alpha_mask: bool,
+    /// File with the source views of each view, in the layout of COLMAP's patch-match.cfg
+    #[arg(long, value_name = "FILE")]
+    sources: Option<String>,
+    /// Box of the world in which surfaces are reconstructed
+    #[arg(long, num_args = 6, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], allow_negative_numbers = true)]
+    bounds: Option<Vec<f64>>,
+}
+
+impl Input {
+    fn set(&self, options: &mut Options) -> Result<()> {
+        let bounds = self
+            .bounds
+            .as_ref()
+            .map(|numbers| numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" "));
+        let texts = [
+            ("input.max_image_size", self.max_image_size.map(|size| size.to_string())),
+            ("input.images", self.images.clone()),
+            ("input.masks", self.masks.clone()),
+            ("input.alpha_mask", self.alpha_mask.then(|| true.to_string())),
+            ("input.sources", self.sources.clone()),
+            ("input.bounds", bounds),
+        ];
+        texts.iter().try_for_each(|(name, text)| text.iter().try_for_each(|text| options.set(name, text)))
+    }
 }
 
 #[derive(Args)]
@@ -239,6 +284,7 @@ impl Run {
         options.threads = self.threads;
         options.seed = self.seed;
         options.memory = self.memory.unwrap_or(0);
+        self.input.set(&mut options)?;
         for part in &self.without {
             match part {
                 Part::ViewSelection => options.view_selection.pixelwise_view_selection = false,
@@ -307,10 +353,10 @@ Exit status: 0 done, 1 failed, 2 wrong arguments, 130 interrupted (Ctrl-C).";
 
 const RECONSTRUCT_HELP: &str = "\
 The scene:
-  images/              photographs, PNG or JPEG, color or gray
-  sparse/, sparse/0/   COLMAP model, text or binary, cameras PINHOLE or SIMPLE_PINHOLE
-  This is what `colmap image_undistorter` writes; run it first when lenses distort:
-    colmap image_undistorter --image_path IMAGES --input_path MODEL --output_path SCENE
+  images/              photographs: PNG, JPEG, TIFF, BMP, WebP, PNM; color or gray, 8 or 16 bits
+  sparse/, sparse/0/   COLMAP model, text or binary, of any camera model
+  Where lenses distort, or --max-image-size, --masks and the like ask for it, changed photographs,
+  masks and their model are written into the folder of the results; the maps belong to those.
 
 Results, in COLMAP's layouts:
   fused.ply                        the cloud: position, normal, color

@@ -19,7 +19,7 @@ use crate::pipeline::status;
 use crate::refine::Filter;
 use crate::refine::gap_filling::FillGaps;
 use crate::refine::speckles::RemoveSpeckles;
-use crate::scene::{PixelEstimate, Scene};
+use crate::scene::{PixelEstimate, Scene, is_inside};
 use crate::view_selection::{ViewRules, select_sets};
 use glam::DVec3;
 
@@ -181,5 +181,9 @@ pub(in crate::pipeline) fn fuse(
             overlap,
         })
         .collect();
-    fusion::fuse(&views, &options.fusion, progress)
+    let cloud = fusion::fuse(&views, &options.fusion, progress)?;
+    Ok(match options.input.bounds()? {
+        Some(bounds) => cloud.filtered(|position| is_inside(bounds, position)),
+        None => cloud,
+    })
 }

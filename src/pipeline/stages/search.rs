@@ -5,6 +5,7 @@ use crate::ambc::{Candidate, Search, SearchResult, SearchRules, stream};
 use crate::cross_view::{self, CandidateCollector, Donor, Target};
 use crate::error::Result;
 use crate::geometry::ViewSets;
+use crate::image::Mask;
 use crate::matching::Problem;
 use crate::options::Options;
 use crate::parallel::Advance;
@@ -170,6 +171,7 @@ pub(in crate::pipeline) fn search(
         SearchResult::without_sources(camera.pixels())
     } else {
         let candidates = candidates.and_then(Candidates::by_pixel);
+        let mask = mask.as_ref().map(Mask::to_vec);
         let names = [context.options.seed, at.view as u64, cycle.scale_index as u64, u64::from(cycle.cycle)];
         let search = Search {
             problem,

@@ -1,0 +1,153 @@
+//! The choice of photographs.
+
+use super::SourceScene;
+use crate::error::{Error, Result};
+use crate::io::cannot_be_read;
+use std::path::Path;
+
+/// Keeps the photographs that a text chooses: names or patterns with `*` (any letters) and `?` (one letter),
+/// separated by commas, or the path of a file with one on each line. Points lose their views that are left out;
+/// those that no chosen photograph saw are dropped where points have tracks.
+///
+/// # Errors
+/// An entry that no photograph matches; fewer than two photographs.
+pub(super) fn select(scene: &mut SourceScene, chosen: &str) -> Result<()> {
+    if chosen.trim().is_empty() {
+        return Ok(());
+    }
+    let entries = entries(chosen)?;
+    let mut is_chosen = vec![false; scene.photographs.len()];
+    for entry in &entries {
+        let mut is_used = false;
+        for (photograph, is_chosen) in scene.photographs.iter().zip(&mut is_chosen) {
+            if matches(entry.as_bytes(), photograph.name.as_bytes()) {
+                (is_used, *is_chosen) = (true, true);
+            }
+        }
+        if !is_used {
+            let expected = match scene.photographs.first() {
+                Some(first) => {
+                    format!("the names of photographs, such as {}, or patterns of them", first.name)
+                }
+                None => "names of photographs".to_owned(),
+            };
+            return Err(Error::argument("options.input.images", format!("`{entry}`"), expected));
+        }
+    }
+    let mut index = 0;
+    let new_index: Vec<Option<u32>> =
+        (is_chosen.iter()).map(|&is_chosen| is_chosen.then(|| (index, index += 1).0)).collect();
+    if index < 2 {
+        let expected = "at least 2 photographs";
+        return Err(Error::argument(
+            "options.input.images",
+            format!("`{chosen}`, which is {index}"),
+            expected,
+        ));
+    }
+    let renumbered =
+        |views: &[u32]| -> Vec<u32> { views.iter().filter_map(|&view| new_index[view as usize]).collect() };
+    for point in &mut scene.points {
+        let had_track = !point.views.is_empty();
+        point.views = renumbered(&point.views);
+        if had_track && point.views.is_empty() {
+            point.position = glam::DVec3::NAN;
+        }
+    }
+    scene.points.retain(|point| !point.position.is_nan());
+    let mut place = 0..;
+    scene.photographs.retain(|_| place.next().is_some_and(|place| is_chosen[place]));
+    for photograph in &mut scene.photographs {
+        photograph.sources = photograph.sources.as_deref().map(renumbered);
+    }
+    Ok(())
+}
+
+/// The names and patterns of a text or of the file at that path.
+fn entries(chosen: &str) -> Result<Vec<String>> {
+    let path = Path::new(chosen.trim());
+    let list = match path.is_file() {
+        true => {
+            std::fs::read_to_string(path).map_err(|error| cannot_be_read(path, error))?.replace(',', "\n")
+        }
+        false => chosen.replace(',', "\n"),
+    };
+    let lines = list.lines().map(str::trim);
+    Ok(lines.filter(|line| !line.is_empty() && !line.starts_with('#')).map(str::to_owned).collect())
+}
+
+/// Whether a name is of a pattern.
+fn matches(pattern: &[u8], name: &[u8]) -> bool {
+    match (pattern.split_first(), name.split_first()) {
+        (None, None) => true,
+        (Some((b'*', rest)), _) => {
+            matches(rest, name) || name.split_first().is_some_and(|(_, after)| matches(pattern, after))
+        }
+        (Some((b'?', rest)), Some((_, after))) => matches(rest, after),
+        (Some((letter, rest)), Some((first, after))) => letter == first && matches(rest, after),
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Lens;
+    use crate::import::SourcePhotograph;
+    use crate::scene::SparsePoint;
+    use crate::testing;
+    use glam::DVec3;
+
+    fn scene() -> SourceScene {
+        let photograph = |name: &str| SourcePhotograph {
+            name: name.to_owned(),
+            path: name.into(),
+            lens: Lens { camera: testing::camera(0.0, (8, 6)), distortion: None },
+            mask: None,
+            depth_range: None,
+            sources: Some(vec![0, 1, 2]),
+        };
+        let point = |views: &[u32]| SparsePoint { position: DVec3::ONE, views: views.to_vec() };
+        SourceScene {
+            origin: "a test".to_owned(),
+            photographs: ["a/1.jpg", "a/2.jpg", "b/1.jpg", "b/10.jpg"].map(photograph).to_vec(),
+            points: vec![point(&[0, 2, 3]), point(&[0, 1]), point(&[])],
+            warnings: Vec::new(),
+        }
+    }
+
+    fn chosen(text: &str) -> Vec<String> {
+        let mut scene = scene();
+        select(&mut scene, text).unwrap();
+        scene.photographs.into_iter().map(|photograph| photograph.name).collect()
+    }
+
+    #[test]
+    fn names_and_patterns_choose_photographs_in_the_order_of_the_scene() {
+        assert_eq!(chosen(""), ["a/1.jpg", "a/2.jpg", "b/1.jpg", "b/10.jpg"]);
+        assert_eq!(chosen("b/10.jpg, a/1.jpg"), ["a/1.jpg", "b/10.jpg"]);
+        assert_eq!(chosen("*/1.jpg"), ["a/1.jpg", "b/1.jpg"]);
+        assert_eq!(chosen("b*"), ["b/1.jpg", "b/10.jpg"]);
+        assert_eq!(chosen("?/?.jpg"), ["a/1.jpg", "a/2.jpg", "b/1.jpg"]);
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), "# the first folder\na/*\n").unwrap();
+        assert_eq!(chosen(file.path().to_str().unwrap()), ["a/1.jpg", "a/2.jpg"]);
+    }
+
+    #[test]
+    fn points_and_sources_are_those_of_the_chosen_photographs() {
+        let mut scene = scene();
+        select(&mut scene, "b/*").unwrap();
+        let views: Vec<&[u32]> = scene.points.iter().map(|point| &point.views[..]).collect();
+        assert_eq!(views, [&[0, 1][..], &[]], "a point without a track stays");
+        assert_eq!(scene.photographs[1].sources.as_deref(), Some(&[0][..]));
+    }
+
+    #[test]
+    fn what_no_photograph_matches_is_refused() {
+        for (text, part) in [("a/1.jpg,c*", "`c*`"), ("a/1.jpg", "at least 2")] {
+            let error = select(&mut scene(), text).unwrap_err().to_string();
+            assert!(error.contains(part), "{error}");
+        }
+    }
+}
