@@ -12,7 +12,7 @@ use crate::io::{
     ColmapModel, ModelImage, SceneFolder, cannot_be_read, deep_picture_from_bytes, largest_value,
     link_or_copy, opaque_pixels, picture_from_bytes, picture_header, read_mask, write_mask, write_photograph,
 };
-use crate::job::{Fingerprint, fingerprint, fingerprint_file};
+use crate::io::{Fingerprint, fingerprint, fingerprint_file};
 use crate::options::InputOptions;
 use crate::parallel::{Phase, Progress, ProgressFn};
 use crate::pipeline::Tracker;

@@ -1,8 +1,8 @@
 //! What was imported into a folder, so that it is not done again.
 
 use crate::error::Result;
+use crate::io::Fingerprint;
 use crate::io::write_file;
-use crate::job::Fingerprint;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

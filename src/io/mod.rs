@@ -6,6 +6,7 @@
 mod colmap_maps;
 mod colmap_model;
 mod files;
+mod fingerprint;
 mod picture_formats;
 mod pictures;
 mod ply;
@@ -22,6 +23,7 @@ pub use files::write_file;
 pub(crate) use files::{
     cannot_be_read, cannot_be_written, link_or_copy, remove_temporary_files, stays_inside,
 };
+pub(crate) use fingerprint::{Fingerprint, fingerprint, fingerprint_file, text};
 pub(crate) use picture_formats::{
     deep_picture_from_bytes, largest_value, opaque_pixels, picture_header, read_mask, write_mask,
     write_photograph,

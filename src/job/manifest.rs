@@ -1,9 +1,9 @@
 //! The manifest of a run: what it is made from. Two runs with equal manifests give the same bits.
 
-use super::fingerprint::{Fingerprint, text};
 use crate::error::{Error, Result};
 use crate::geometry::DepthRange;
 use crate::io::{ColmapModel, cannot_be_read, write_file};
+use crate::io::{Fingerprint, text};
 use crate::options::Options;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -188,7 +188,7 @@ fn model_fingerprint(model: &ColmapModel) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::fingerprint::fingerprint;
+    use crate::io::fingerprint;
 
     fn manifest() -> Manifest {
         let photograph = |name: &str| {

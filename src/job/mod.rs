@@ -9,7 +9,6 @@
 //! The folder is also the workspace with the results: see [`crate::io::Workspace`].
 
 mod estimates;
-mod fingerprint;
 mod folder;
 mod fuse;
 mod manifest;
@@ -32,7 +31,6 @@ use crate::parallel::{JoinedPool, ProgressFn, useful_threads};
 use crate::pipeline::{Checked, CheckedEstimates, CycleRecord, Stepper, ViewEstimate, thread_count};
 use crate::scene::{Scene, is_inside};
 use estimates::Estimates;
-pub(crate) use fingerprint::{Fingerprint, fingerprint, fingerprint_file};
 use folder::{Access, RunFolder};
 use fuse::FinishedViews;
 use glam::DVec3;

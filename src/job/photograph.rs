@@ -1,8 +1,8 @@
 //! Photographs in files, decoded when they are needed and compared with their fingerprint each time.
 
-use super::fingerprint::{Fingerprint, fingerprint};
 use crate::error::{Error, Result};
 use crate::image::{Picture, PictureSource};
+use crate::io::{Fingerprint, fingerprint};
 use crate::io::{cannot_be_read, picture_from_bytes};
 use std::path::PathBuf;
 

@@ -1,6 +1,5 @@
 //! The beginning of a run: the scene is read and compared with what the folder holds.
 
-use super::fingerprint::{fingerprint, fingerprint_file};
 use super::folder::RunFolder;
 use super::manifest::{Manifest, PhotographEntry};
 use super::photograph::FilePhotograph;
@@ -13,6 +12,7 @@ use crate::io::{
     ColmapModel, ModelImage, SceneFolder, Workspace, cannot_be_read, link_or_copy, picture_from_bytes,
     read_mask, remove_temporary_files,
 };
+use crate::io::{fingerprint, fingerprint_file};
 use crate::options::Options;
 use crate::parallel::{Phase, Progress, ProgressFn};
 use crate::pipeline::Tracker;

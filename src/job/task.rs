@@ -1,9 +1,9 @@
 //! The tasks of a run, and the records that they are done.
 
-use super::fingerprint::{Fingerprint, fingerprint_file, text};
 use super::folder::RunFolder;
 use crate::ambc::Counts;
 use crate::error::{Error, Result};
+use crate::io::{Fingerprint, fingerprint_file, text};
 use crate::io::{stays_inside, write_file};
 use crate::pipeline::CycleRecord;
 use crate::scene::PixelStatus;
@@ -175,7 +175,7 @@ impl Record {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::fingerprint::fingerprint;
+    use crate::io::fingerprint;
 
     fn bytes_of(path: &str) -> Vec<u8> {
         let files = vec![FileEntry { path: path.to_owned(), content: fingerprint(b"content") }];

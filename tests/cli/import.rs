@@ -83,7 +83,8 @@ fn photographs_are_reduced_chosen_and_masked_as_asked() {
     let masks = TempDir::new().unwrap();
     let (width, height) = (WIDTH as u32 / 4, HEIGHT as u32 / 4);
     // The left half of the first photograph is ignored.
-    let mask = image::GrayImage::from_fn(width, height, |x, _| image::Luma([if x < width / 2 { 0 } else { 255 }]));
+    let mask =
+        image::GrayImage::from_fn(width, height, |x, _| image::Luma([if x < width / 2 { 0 } else { 255 }]));
     mask.save(masks.path().join(format!("{}.png", NAMES[0]))).unwrap();
     let first_four = NAMES[..4].join(",");
     let arguments = ["--max-image-size", "120", "--images", &first_four, "--masks", path(&masks)];
@@ -127,9 +128,10 @@ fn twelve_bits_in_sixteen_are_used_in_full() {
     for name in NAMES {
         let file = scene.path().join("images").join(name);
         let eight = image::open(&file).unwrap().into_luma8();
-        let twelve = image::ImageBuffer::<image::Luma<u16>, _>::from_fn(eight.width(), eight.height(), |x, y| {
-            image::Luma([u16::from(eight.get_pixel(x, y).0[0]) * 16])
-        });
+        let twelve =
+            image::ImageBuffer::<image::Luma<u16>, _>::from_fn(eight.width(), eight.height(), |x, y| {
+                image::Luma([u16::from(eight.get_pixel(x, y).0[0]) * 16])
+            });
         save_png(&file, &image::DynamicImage::from(twelve));
     }
     let printed = reconstruct(&scene, &deep, &[]);

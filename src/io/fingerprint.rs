@@ -1,7 +1,7 @@
 //! Fingerprints of contents: what changed by accident has another one. They do not protect against intent.
 
+use super::files::cannot_be_read;
 use crate::error::Result;
-use crate::io::cannot_be_read;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::Read;
@@ -39,6 +39,6 @@ pub(crate) fn fingerprint_file(path: &Path) -> Result<Fingerprint> {
 }
 
 /// Sixteen hexadecimal digits.
-pub(super) fn text(hash: u64) -> String {
+pub(crate) fn text(hash: u64) -> String {
     format!("{hash:016x}")
 }
