@@ -10,6 +10,7 @@ mod cloud;
 mod exposure;
 mod overlap;
 mod source;
+mod streamed;
 
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
@@ -24,6 +25,7 @@ pub use overlap::overlaps;
 use rayon::prelude::*;
 use source::{Comparison, Source};
 use std::sync::atomic::{AtomicU64, Ordering};
+pub(crate) use streamed::{LoadedView, StreamedViews, streamed_bytes};
 
 /// A view with its maps: the input of [`fuse`].
 #[derive(Debug, Clone, Copy)]

@@ -6,12 +6,16 @@
 mod colmap_maps;
 mod colmap_model;
 mod files;
+mod jpeg_end;
 mod pictures;
+mod places;
 mod ply;
 mod previews;
 mod scene_folder;
 mod workspace;
+mod workspace_maps;
 
+pub(crate) use colmap_maps::map_size;
 pub use colmap_maps::{
     ConsistencyGraph, Grid, read_consistency_graph, read_depth_map, read_normal_map, write_consistency_graph,
     write_depth_map, write_normal_map,
@@ -19,7 +23,8 @@ pub use colmap_maps::{
 pub use colmap_model::{ColmapModel, ModelImage};
 pub use files::write_file;
 pub(crate) use files::{
-    cannot_be_read, cannot_be_written, link_or_copy, remove_temporary_files, stays_inside,
+    NewFolders, cannot_be_read, cannot_be_written, check_file_place, link_or_copy, remove_temporary_files,
+    stays_inside,
 };
 pub(crate) use pictures::picture_from_bytes;
 pub use pictures::{picture_size, read_picture, write_picture};
@@ -27,4 +32,5 @@ pub(crate) use ply::{CloudWriter, visibility_path};
 pub use ply::{read_ply, read_visibility, write_ply, write_visibility};
 pub use previews::{write_depth_preview, write_fraction_preview, write_normal_preview, write_views_preview};
 pub use scene_folder::{SceneFolder, read_scene, write_scene};
-pub use workspace::{MapKind, Workspace, WorkspaceMaps, WorkspaceView};
+pub use workspace::{MapKind, Workspace};
+pub use workspace_maps::{WorkspaceMaps, WorkspaceView};

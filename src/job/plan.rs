@@ -29,17 +29,23 @@ pub(super) struct Plan {
 /// Reads a scene and decodes each photograph once: a damaged one is found now and not after hours.
 ///
 /// # Errors
-/// A file that is missing, damaged, or not of its camera's size; [`Error::Cancelled`].
+/// A file that is missing, damaged, or not of its camera's size; one of the run that could not be written;
+/// [`Error::Cancelled`].
 pub(super) fn read(
     folder: &SceneFolder,
     depth_range: Option<DepthRange>,
     options: &Options,
+    run: &RunFolder,
     progress: ProgressFn,
 ) -> Result<Plan> {
     if !folder.images.is_dir() {
         return Err(Error::file(&folder.images, "no such folder; expected the photographs in it"));
     }
     let model = ColmapModel::read(&folder.sparse)?;
+    let images = model.images.iter().map(|image| run.root().join("images").join(&image.name));
+    let others = run.own_files().into_iter().chain(images).collect();
+    let names = model.images.iter().map(|image| image.name.as_str());
+    Workspace::new(run.root()).check_places_and(names, others)?;
     let tracker = Tracker::with_work(progress, model.images.len() as u64);
     let advance = |units, view| {
         let (phase, views) = (Phase::Read, model.images.len());

@@ -1,7 +1,7 @@
 //! The arguments of the command line, and their help.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use skep::{DepthRange, FusionOptions, Options, Result};
+use skep::{DepthRange, Options, Result};
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -275,9 +275,9 @@ impl Fuse {
         changes_nothing && self.scene.is_none() && self.output.is_none() && is_run
     }
 
-    /// The options of the fusion.
-    pub fn options(&self) -> Result<FusionOptions> {
-        let mut options = Options::default();
+    /// The options of the fusion, its threads and memory.
+    pub fn options(&self) -> Result<Options> {
+        let mut options = self.resources.options();
         for (name, value) in &self.set {
             options.set(name, value)?;
         }
@@ -285,7 +285,7 @@ impl Fuse {
             options.fusion.min_confidence = least;
         }
         options.check()?;
-        Ok(options.fusion)
+        Ok(options)
     }
 
     /// The file of the cloud.
@@ -303,7 +303,9 @@ Examples:
   skep info sigma_color             explanation of one option
   skep help reconstruct             input and output files, and remedies of failures
 
-Exit status: 0 done, 1 failed, 2 wrong arguments, 130 interrupted (Ctrl-C).";
+Exit status: 0 done, 1 failed, 2 wrong arguments; interrupted: 130 by Ctrl-C (SIGINT), 143 by SIGTERM,
+129 by SIGHUP. A second signal ends the program at once. Signals that are ignored when it starts, as
+`nohup` has it, stay ignored.";
 
 const RECONSTRUCT_HELP: &str = "\
 The scene:
