@@ -2,9 +2,12 @@
 #![cfg(feature = "cli")]
 
 mod dump;
+mod fuse;
 #[cfg(unix)]
 mod interruption;
 mod layouts;
+mod progress;
+mod refusals;
 mod run_folder;
 
 use layouts::{check_cloud, check_maps};

@@ -1,5 +1,6 @@
 //! The arguments of the command line, and their help.
 
+use crate::progress::Messages;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use skep::{DepthRange, Options, Result};
 use std::ops::Range;
@@ -78,9 +79,8 @@ pub struct Run {
     /// Begin anew where a run in the folder would go on
     #[arg(long)]
     pub fresh: bool,
-    /// Print warnings and errors only
-    #[arg(short, long)]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub messages: Messages,
 }
 
 #[derive(Args)]
@@ -122,9 +122,8 @@ pub struct Planned {
     pub folder: PathBuf,
     #[command(flatten)]
     pub resources: Resources,
-    /// Print warnings and errors only
-    #[arg(short, long)]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub messages: Messages,
 }
 
 #[derive(Args)]
@@ -222,9 +221,8 @@ pub struct Fuse {
     min_confidence: Option<f64>,
     #[command(flatten)]
     pub resources: Resources,
-    /// Print warnings and errors only
-    #[arg(short, long)]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub messages: Messages,
 }
 
 impl Run {
@@ -302,6 +300,11 @@ Examples:
   skep info                         the options and their values in the presets
   skep info sigma_color             explanation of one option
   skep help reconstruct             input and output files, and remedies of failures
+
+Lines of --progress json: phase (read, search, check, fusion), done (0 to 1), seconds_left (null at first), view
+(the one that is worked on, from 0; several may be at the same time), views (their number), cycle (from 0) and
+downscale of its scale, both null except in search and check; or message. Warnings and errors are lines that
+begin with `warning: ` and `error: `.
 
 Exit status: 0 done, 1 failed, 2 wrong arguments; interrupted: 130 by Ctrl-C (SIGINT), 143 by SIGTERM,
 129 by SIGHUP. A second signal ends the program at once. Signals that are ignored when it starts, as

@@ -13,7 +13,7 @@ const MOST_NAMES: usize = 5;
 
 /// Runs the command.
 pub fn run(arguments: &Fuse, interrupt: &Interrupt) -> Result<(), Failure> {
-    let display = Display::new(arguments.quiet);
+    let display = Display::new(&arguments.messages);
     if arguments.is_task() {
         return task(arguments, display, interrupt);
     }
@@ -44,7 +44,7 @@ pub fn run(arguments: &Fuse, interrupt: &Interrupt) -> Result<(), Failure> {
     drop(reporter);
     colorless(&maps, &fused).iter().for_each(|warning| streams::warning(warning));
     few_points(&fused, &options).iter().for_each(|warning| streams::warning(warning));
-    if !arguments.quiet {
+    if !arguments.messages.quiet {
         let FusedWorkspace { points, pixels, depths, .. } = fused;
         let kind = maps.kind.colmap_name();
         streams::result(&format!("{depths} depths of {pixels} pixels in the {kind} maps"));
@@ -57,7 +57,7 @@ pub fn run(arguments: &Fuse, interrupt: &Interrupt) -> Result<(), Failure> {
 fn task(arguments: &Fuse, display: Display, interrupt: &Interrupt) -> Result<(), Failure> {
     let job = Job::open(&arguments.workspace, &arguments.resources.options())?;
     tasks::run(&job, &[Task::Fuse], display, interrupt)?;
-    reconstruct::conclude(&job, &job.summary()?, None, arguments.quiet)
+    reconstruct::conclude(&job, &job.summary()?, None, arguments.messages.quiet)
 }
 
 /// The views without maps, and the number of views without photographs.

@@ -12,6 +12,7 @@ mod report;
 mod stopwatch;
 mod streams;
 mod tasks;
+mod time_left;
 
 use arguments::{Arguments, Command};
 use clap::Parser;

@@ -23,7 +23,7 @@ const LARGE_SHARE: f64 = 10.0;
 pub fn run(arguments: &Reconstruct, interrupt: &Interrupt) -> std::result::Result<(), Failure> {
     let run = &arguments.run;
     let stopwatch = Mutex::new(Stopwatch::start());
-    let display = Display::new(run.quiet);
+    let display = Display::new(&run.messages);
     let job = plan(run, display, interrupt)?;
     if let Some(folder) = &arguments.dump {
         require_writable(folder)?;
@@ -47,7 +47,7 @@ pub fn run(arguments: &Reconstruct, interrupt: &Interrupt) -> std::result::Resul
 
     let mut stopwatch = stopwatch.into_inner().unwrap_or_else(PoisonError::into_inner);
     stopwatch.enter(Stage::Writing);
-    conclude(&job, &result, Some(stopwatch.times()), run.quiet)
+    conclude(&job, &result, Some(stopwatch.times()), run.messages.quiet)
 }
 
 /// Writes the report of a complete run, and says what the run made. `times` are those of the whole run.

@@ -12,7 +12,7 @@ use std::ops::Range;
 /// `skep plan`: prepares the folder, and prints the tasks or writes them to the files that were asked for.
 pub fn plan(arguments: &Plan, interrupt: &Interrupt) -> Result<(), Failure> {
     let run = &arguments.run;
-    let job = reconstruct::plan(run, Display::new(run.quiet), interrupt)?;
+    let job = reconstruct::plan(run, Display::new(&run.messages), interrupt)?;
     let folder = run.output();
     if let Some(file) = &arguments.openjd {
         plan_files::write_openjd(&job, &folder, file)?;
@@ -20,7 +20,7 @@ pub fn plan(arguments: &Plan, interrupt: &Interrupt) -> Result<(), Failure> {
     if let Some(file) = &arguments.slurm {
         plan_files::write_slurm(&job, &folder, file)?;
     }
-    if !run.quiet && arguments.openjd.is_none() && arguments.slurm.is_none() {
+    if !run.messages.quiet && arguments.openjd.is_none() && arguments.slurm.is_none() {
         let lines = plan_files::command_lines(&job, &folder.display().to_string());
         lines.iter().for_each(|line| streams::result(line));
     }
@@ -48,7 +48,7 @@ pub fn finish(arguments: &FinishViews, interrupt: &Interrupt) -> Result<(), Fail
 pub fn next(arguments: &NextCycle, interrupt: &Interrupt) -> Result<(), Failure> {
     let planned = &arguments.planned;
     let job = Job::open(&planned.folder, &planned.resources.options())?;
-    let display = Display::new(planned.quiet);
+    let display = Display::new(&planned.messages);
     Ok(run(&job, &[Task::Next { cycle: arguments.cycle }], display, interrupt)?)
 }
 
@@ -67,7 +67,7 @@ fn of_views(
         return Err(Failure::Usage(Error::argument("--views", value, format!("views of 0..{count}"))));
     }
     let tasks: Vec<Task> = views.map(task).collect();
-    Ok(run(&job, &tasks, Display::new(planned.quiet), interrupt)?)
+    Ok(run(&job, &tasks, Display::new(&planned.messages), interrupt)?)
 }
 
 /// Does tasks; displays the progress, and ends early when interrupted.
