@@ -27,9 +27,19 @@ pub(super) fn results(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     all.map(|path| (path.clone(), std::fs::read(folder.join(path)).unwrap())).collect()
 }
 
+/// Whether the tests, and so the commands they start, ignore a signal: `nohup` and `&` of scripts ask for that.
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.is_some_and(|mask| u64::from_str_radix(mask.trim(), 16).unwrap() >> (signal - 1) & 1 == 1)
+}
+
 #[test]
 fn each_signal_ends_with_its_status_and_says_how_to_go_on() {
     for (signal, expected) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
+        if is_ignored(expected - 128) {
+            continue;
+        }
         let (output, board) = (TempDir::new().unwrap(), board());
         let arguments = ["reconstruct", board.to_str().unwrap(), "--output", path(&output)];
         let (status, printed) = interrupted(&arguments, "search", signal);
@@ -42,13 +52,13 @@ fn each_signal_ends_with_its_status_and_says_how_to_go_on() {
 
 #[test]
 fn an_interruption_while_photographs_are_read_leaves_nothing() {
-    let (scene, output) = (TempDir::new().unwrap(), board());
-    let dense = scene.path().join("new/dense");
-    let arguments = ["reconstruct", output.to_str().unwrap(), "--output", dense.to_str().unwrap()];
-    let (status, printed) = interrupted(&arguments, "read", "-INT");
-    assert_eq!(status, Some(130), "{printed}");
+    let (folder, scene) = (TempDir::new().unwrap(), board());
+    let dense = folder.path().join("new/dense");
+    let arguments = ["reconstruct", scene.to_str().unwrap(), "--output", dense.to_str().unwrap()];
+    let (status, printed) = interrupted(&arguments, "read", "-TERM");
+    assert_eq!(status, Some(143), "{printed}");
     if printed.contains("nothing was changed") {
-        assert!(!scene.path().join("new").exists());
+        assert!(!folder.path().join("new").exists());
     }
 }
 
