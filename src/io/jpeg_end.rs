@@ -28,8 +28,8 @@ fn find_end(file: &mut impl BufRead) -> io::Result<bool> {
     }
     let mut marker = next_marker(file)?;
     while marker != END_OF_IMAGE {
-        // Markers without content.
-        if !matches!(marker, 0x01 | 0xd0..=START_OF_IMAGE) {
+        // Markers without content; 0 is none, but garbage between segments.
+        if !matches!(marker, 0x00 | 0x01 | 0xd0..=START_OF_IMAGE) {
             let Some(length) = u16::from_be_bytes(bytes(file)?).checked_sub(2) else { return Ok(false) };
             if io::copy(&mut file.take(length.into()), &mut io::sink())? < length.into() {
                 return Ok(false);

@@ -59,9 +59,9 @@ impl RunFolder {
         self.estimates().join(format!("cycle{cycle:02}-{view:05}.{stage}"))
     }
 
-    /// A file of each kind besides those of the views.
+    /// A file of each kind besides those of the views and the scene.
     pub(super) fn own_files(&self) -> Vec<PathBuf> {
-        let fixed = ["fused.ply.vis", "stereo/fusion.cfg", "stereo/patch-match.cfg", "sparse/cameras.bin"];
+        let fixed = ["fused.ply.vis", "stereo/fusion.cfg", "stereo/patch-match.cfg"];
         let mut files: Vec<PathBuf> = fixed.iter().map(|file| self.0.join(file)).collect();
         files.extend([
             self.report(),

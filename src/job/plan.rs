@@ -42,8 +42,14 @@ pub(super) fn read(
         return Err(Error::file(&folder.images, "no such folder; expected the photographs in it"));
     }
     let model = ColmapModel::read(&folder.sparse)?;
-    let images = model.images.iter().map(|image| run.root().join("images").join(&image.name));
-    let others = run.own_files().into_iter().chain(images).collect();
+    let mut others = run.own_files();
+    let (images, sparse) = (run.root().join("images"), run.root().join("sparse"));
+    if !is_same(&images, &folder.images) {
+        others.extend(model.images.iter().map(|image| images.join(&image.name)));
+    }
+    if !is_same_model(&sparse, folder) {
+        others.push(sparse.join("cameras.bin"));
+    }
     let names = model.images.iter().map(|image| image.name.as_str());
     Workspace::new(run.root()).check_places_and(names, others)?;
     let tracker = Tracker::with_work(progress, model.images.len() as u64);
@@ -222,7 +228,7 @@ fn adopt(folder: &RunFolder, scene: &SceneFolder, manifest: &Manifest) -> Result
         }
     }
     let sparse = folder.root().join("sparse");
-    if is_same(&sparse, &scene.sparse) || is_same(&sparse.join("0"), &scene.sparse) {
+    if is_same_model(&sparse, scene) {
         return Ok(());
     }
     // A model is a set of files: those of another one must not stay beside it.
@@ -240,6 +246,11 @@ fn adopt(folder: &RunFolder, scene: &SceneFolder, manifest: &Manifest) -> Result
         }
     }
     Ok(())
+}
+
+/// Whether the model of a scene is in this folder `sparse`, or in `sparse/0`.
+fn is_same_model(sparse: &Path, scene: &SceneFolder) -> bool {
+    is_same(sparse, &scene.sparse) || is_same(&sparse.join("0"), &scene.sparse)
 }
 
 /// Whether two paths are the same folder.
