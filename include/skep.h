@@ -546,19 +546,19 @@ const char *skep_option_name(size_t index);
  */
 typedef struct skep_camera {
     /**
-     * Focal length in x, in pixels, above 0.
+     * Focal length in x, in pixels, of 0.001 to 1e9.
      */
     double fx;
     /**
-     * Focal length in y, in pixels, above 0.
+     * Focal length in y, in pixels, of 0.001 to 1e9.
      */
     double fy;
     /**
-     * Column of the principal point, in pixels.
+     * Column of the principal point, in pixels, of -1e9 to 1e9.
      */
     double cx;
     /**
-     * Row of the principal point, in pixels.
+     * Row of the principal point, in pixels, of -1e9 to 1e9.
      */
     double cy;
     /**
@@ -566,7 +566,7 @@ typedef struct skep_camera {
      */
     double rotation[9];
     /**
-     * Translation from world to camera, in world units.
+     * Translation from world to camera, in world units, of -1e18 to 1e18.
      */
     double translation[3];
 } skep_camera;
@@ -2054,12 +2054,13 @@ skep_status skep_scene_read_colmap(const char *folder,
 
 /**
  * Writes a scene as a folder that COLMAP and skep_scene_read_colmap read: images as PNG files under the
- * names of their views in images/, and a binary model in sparse/.
+ * names of their views in images/, and a binary model in sparse/. A name need not end in .png: readers of
+ * images look at the content.
  *
  * @param scene   The scene.
  * @param folder  Path of the folder, which is created.
- * @retval SKEP_ERR_ARGUMENT  A view whose name does not end in .png or leads out of the folder, or a scene
- *                            that skep_scene_validate refuses.
+ * @retval SKEP_ERR_ARGUMENT  A view whose name leads out of the folder, or a scene that skep_scene_validate
+ *                            refuses.
  * @retval SKEP_ERR_FILE      A file that cannot be written.
  */
 skep_status skep_scene_write_colmap(const struct skep_scene *scene, const char *folder);

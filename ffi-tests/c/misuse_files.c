@@ -37,6 +37,9 @@ static void check_null(const char *folder, const skep_scene *handed_in, const sk
     FAILS(skep_cloud_write_ply(cloud, NULL), SKEP_ERR_NULL, "file");
     FAILS(skep_write_depth_map(NULL, MAP, WIDTH, HEIGHT, 4 * WIDTH), SKEP_ERR_NULL, "file");
     FAILS(skep_write_depth_map(file, NULL, WIDTH, HEIGHT, 4 * WIDTH), SKEP_ERR_NULL, "depth");
+    /* Pointers are looked at before gigabytes are taken for a copy. */
+    FAILS(skep_write_depth_map(file, NULL, 32768, 32768, 4 * 32768), SKEP_ERR_NULL, "depth");
+    FAILS(skep_write_normal_map(file, NULL, 32768, 32768, 12 * 32768), SKEP_ERR_NULL, "normal");
     FAILS(skep_write_depth_map(file, MAP, 0, HEIGHT, 4 * WIDTH), SKEP_ERR_ARGUMENT, "width is 0");
     FAILS(skep_write_depth_map(file, MAP, WIDTH, 0, 4 * WIDTH), SKEP_ERR_ARGUMENT, "height is 0");
     FAILS(skep_write_depth_map(file, MAP, UINT32_MAX, UINT32_MAX, SIZE_MAX), SKEP_ERR_ARGUMENT,

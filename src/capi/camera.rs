@@ -10,17 +10,17 @@ use glam::{DMat3, DVec3};
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct skep_camera {
-    /// Focal length in x, in pixels, above 0.
+    /// Focal length in x, in pixels, of 0.001 to 1e9.
     pub fx: f64,
-    /// Focal length in y, in pixels, above 0.
+    /// Focal length in y, in pixels, of 0.001 to 1e9.
     pub fy: f64,
-    /// Column of the principal point, in pixels.
+    /// Column of the principal point, in pixels, of -1e9 to 1e9.
     pub cx: f64,
-    /// Row of the principal point, in pixels.
+    /// Row of the principal point, in pixels, of -1e9 to 1e9.
     pub cy: f64,
     /// Rotation from world to camera, row by row; orthonormal within 1e-4, determinant 1.
     pub rotation: [f64; 9],
-    /// Translation from world to camera, in world units.
+    /// Translation from world to camera, in world units, of -1e18 to 1e18.
     pub translation: [f64; 3],
 }
 

@@ -96,10 +96,10 @@ pub unsafe extern "C" fn skep_cloud_get_views(
         // SAFETY: as the header demands of the caller.
         unsafe {
             let lists = &get(cloud, "cloud")?.points.views;
+            let view_counts = wanted(view_counts, capacity, lists.len(), "view_counts")?;
+            let views = wanted(views, view_capacity, lists.total(), "views")?;
             let counts: Vec<u32> = (0..lists.len()).map(|point| lists.get(point).len() as u32).collect();
             let all: Vec<u32> = (0..lists.len()).flat_map(|point| lists.get(point)).copied().collect();
-            let view_counts = wanted(view_counts, capacity, counts.len(), "view_counts")?;
-            let views = wanted(views, view_capacity, all.len(), "views")?;
             view_counts.into_iter().for_each(|out| out.set(&counts));
             views.into_iter().for_each(|out| out.set(&all));
         }

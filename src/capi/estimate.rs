@@ -86,6 +86,7 @@ pub unsafe extern "C" fn skep_estimate_from_maps(
         // SAFETY: as the header demands of the caller.
         let (maps, validated, cost) = unsafe {
             let normal = normal.cast::<[f32; 3]>();
+            maps::check(normal, size, normal_stride_bytes, "normal")?;
             let maps = Maps {
                 depth: maps::read(depth, size, depth_stride_bytes, "depth")?,
                 normal: maps::read(normal, size, normal_stride_bytes, "normal")?,
@@ -172,8 +173,6 @@ pub unsafe extern "C" fn skep_estimate_get_maps(
     guard(|| {
         // SAFETY: as the header demands of the caller.
         let estimate = &unsafe { get(estimate, "estimate") }?.estimate;
-        let (maps, costs) = (estimate.maps(), estimate.cost());
-        let flags: Vec<u8> = estimate.validated().into_iter().map(u8::from).collect();
         let needed = estimate.pixels();
         // SAFETY: as the header demands of the caller.
         unsafe {
@@ -181,6 +180,8 @@ pub unsafe extern "C" fn skep_estimate_get_maps(
             let normal = wanted(normal.cast::<[f32; 3]>(), capacity, needed, "normal")?;
             let cost = wanted(cost, capacity, needed, "cost")?;
             let validated = wanted(validated, capacity, needed, "validated")?;
+            let (maps, costs) = (estimate.maps(), estimate.cost());
+            let flags: Vec<u8> = estimate.validated().into_iter().map(u8::from).collect();
             depth.into_iter().for_each(|out| out.set(&maps.depth));
             normal.into_iter().for_each(|out| out.set(&maps.normal));
             cost.into_iter().for_each(|out| out.set(&costs));

@@ -7,10 +7,13 @@ use super::pointers::{get, give_list, out, path, slice, wanted};
 use super::result::skep_result;
 use super::scene::skep_scene;
 use super::status::{Failure, guard, skep_status};
+use crate::error::Error;
 use crate::geometry::DepthRange;
 use crate::io::{self, Workspace};
+use crate::memory::require_memory;
 use crate::scene::View;
 use std::ffi::c_char;
+use std::path::Path;
 
 /// Reads a scene from a folder with images/ and a COLMAP model in sparse/ or sparse/0/, as `colmap
 /// image_undistorter` writes it: text or binary, cameras PINHOLE or SIMPLE_PINHOLE, images PNG or JPEG.
@@ -43,12 +46,13 @@ pub unsafe extern "C" fn skep_scene_read_colmap(
 }
 
 /// Writes a scene as a folder that COLMAP and skep_scene_read_colmap read: images as PNG files under the
-/// names of their views in images/, and a binary model in sparse/.
+/// names of their views in images/, and a binary model in sparse/. A name need not end in .png: readers of
+/// images look at the content.
 ///
 /// @param scene   The scene.
 /// @param folder  Path of the folder, which is created.
-/// @retval SKEP_ERR_ARGUMENT  A view whose name does not end in .png or leads out of the folder, or a scene
-///                            that skep_scene_validate refuses.
+/// @retval SKEP_ERR_ARGUMENT  A view whose name leads out of the folder, or a scene that skep_scene_validate
+///                            refuses.
 /// @retval SKEP_ERR_FILE      A file that cannot be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_scene_write_colmap(
@@ -96,6 +100,7 @@ pub unsafe extern "C" fn skep_result_write_workspace(
         }
         // The lists name all views, those without a result too.
         views.iter().try_for_each(|view| Workspace::check_name(&view.name))?;
+        workspace.check_places(results.iter().map(|(view, _)| view.name.as_str()))?;
         for (view, result) in results {
             workspace.write_view(&view.name, &view.camera, result)?;
         }
@@ -216,6 +221,7 @@ pub unsafe extern "C" fn skep_write_consistency_graph(
             let expected = format!("at most {}, what the layout holds", i32::MAX);
             return Err(Failure::argument(&format!("views[{place}]"), views[place], expected));
         }
+        require_memory(8 * pixels as u64, "the places of the views")?;
         let mut ends = Vec::with_capacity(pixels);
         let sum = counts.iter().fold(0usize, |sum, &count| {
             ends.push(sum.saturating_add(count as usize));
@@ -228,6 +234,14 @@ pub unsafe extern "C" fn skep_write_consistency_graph(
             views[ends[pixel] - counts[pixel] as usize..ends[pixel]].iter().copied()
         })?)
     })
+}
+
+/// The values of a map of so many pixels; another process may have replaced the file since its size was read.
+fn require_length<T>(file: &Path, values: Vec<T>, pixels: usize) -> Result<Vec<T>, Failure> {
+    match values.len() == pixels {
+        true => Ok(values),
+        false => Err(Error::file(file, "changed while it was read").into()),
+    }
 }
 
 /// Reads a depth map in COLMAP's layout, row after row without gaps.
@@ -251,12 +265,14 @@ pub unsafe extern "C" fn skep_read_depth_map(
         // SAFETY: as the header demands of the caller.
         unsafe {
             let (width, height) = (out(width_out, "width_out")?, out(height_out, "height_out")?);
-            let map = io::read_depth_map(path(file, "file")?)?;
-            wanted(depth, capacity, map.values.len(), "depth")?
-                .into_iter()
-                .for_each(|out| out.set(&map.values));
-            width.set(map.width);
-            height.set(map.height);
+            let file = path(file, "file")?;
+            let size = io::map_size(file, 1)?;
+            let pixels = size.0 as usize * size.1 as usize;
+            if let Some(out) = wanted(depth, capacity, pixels, "depth")? {
+                out.set(&require_length(file, io::read_depth_map(file)?.values, pixels)?);
+            }
+            width.set(size.0);
+            height.set(size.1);
         }
         Ok(())
     })
@@ -284,11 +300,14 @@ pub unsafe extern "C" fn skep_read_normal_map(
         // SAFETY: as the header demands of the caller.
         unsafe {
             let (width, height) = (out(width_out, "width_out")?, out(height_out, "height_out")?);
-            let map = io::read_normal_map(path(file, "file")?)?;
-            let values = map.values.as_flattened();
-            wanted(normal, capacity, values.len(), "normal")?.into_iter().for_each(|out| out.set(values));
-            width.set(map.width);
-            height.set(map.height);
+            let file = path(file, "file")?;
+            let size = io::map_size(file, 3)?;
+            let pixels = size.0 as usize * size.1 as usize;
+            if let Some(out) = wanted(normal, capacity, 3 * pixels, "normal")? {
+                out.set(require_length(file, io::read_normal_map(file)?.values, pixels)?.as_flattened());
+            }
+            width.set(size.0);
+            height.set(size.1);
         }
         Ok(())
     })
@@ -323,6 +342,7 @@ pub unsafe extern "C" fn skep_read_consistency_graph(
         // SAFETY: as the header demands of the caller.
         unsafe {
             let (width, height) = (out(width_out, "width_out")?, out(height_out, "height_out")?);
+            out(view_total_out, "view_total_out")?;
             let graph = io::read_consistency_graph(path(file, "file")?)?;
             let pixels = graph.width as usize * graph.height as usize;
             // The header may lie about the size: memory is taken only for a caller who has as much.

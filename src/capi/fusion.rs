@@ -58,13 +58,36 @@ struct Own<'a> {
 }
 
 impl skep_fusion_view {
+    /// Checks all fields and pointers, before any view is copied.
+    ///
+    /// # Safety
+    /// The pointers point to what the fields say.
+    unsafe fn check(&self, name: &str) -> Result<(), Failure> {
+        let size = (self.width, self.height);
+        check_size(size, &format!("{name}."))?;
+        // SAFETY: as promised by the caller.
+        unsafe { get(self.camera, &format!("{name}.camera")) }?.sized(size, &format!("{name}.camera"))?;
+        maps::check(self.depth, size, self.depth_stride_bytes, &format!("{name}.depth"))?;
+        let normal = self.normal.cast::<[f32; 3]>();
+        maps::check(normal, size, self.normal_stride_bytes, &format!("{name}.normal"))?;
+        if !self.confidence_or_null.is_null() {
+            let (confidence, stride) = (self.confidence_or_null, self.confidence_stride_bytes);
+            maps::check(confidence, size, stride, &format!("{name}.confidence_or_null"))?;
+        }
+        if !self.image_or_null.is_null() {
+            // SAFETY: as promised by the caller.
+            unsafe { self.image(&format!("{name}.image")) }?.check(&format!("{name}.image"))?;
+        }
+        // SAFETY: as promised by the caller.
+        unsafe { slice(self.overlap, self.overlap_count, &format!("{name}.overlap")) }.map(drop)
+    }
+
     /// # Safety
     /// The pointers point to what the fields say, for `'a`.
     unsafe fn copied<'a>(&self, name: &str) -> Result<Own<'a>, Failure> {
         let size = (self.width, self.height);
         // SAFETY: as promised by the caller.
         unsafe {
-            check_size(size, &format!("{name}."))?;
             let camera =
                 get(self.camera, &format!("{name}.camera"))?.sized(size, &format!("{name}.camera"))?;
             let depth = maps::read(self.depth, size, self.depth_stride_bytes, &format!("{name}.depth"))?;
@@ -82,24 +105,25 @@ impl skep_fusion_view {
             };
             let picture = match self.image_or_null.is_null() {
                 true => None,
-                false => Some(self.image(&format!("{name}.image"))?),
+                false => Some(self.image(&format!("{name}.image"))?.picture(&format!("{name}.image"))?),
             };
             let overlap = slice(self.overlap, self.overlap_count, &format!("{name}.overlap"))?;
             Ok(Own { camera, maps: Maps { depth, normal }, confidence, picture, overlap })
         }
     }
 
+    /// The image, which has the size of the maps.
+    ///
     /// # Safety
-    /// `image_or_null` points to an image.
-    unsafe fn image(&self, name: &str) -> Result<Picture, Failure> {
+    /// `image_or_null` points to an image for `'a`.
+    unsafe fn image<'a>(&self, name: &str) -> Result<&'a skep_image, Failure> {
         // SAFETY: as promised by the caller.
         let image = unsafe { get(self.image_or_null, name) }?;
         if (image.width, image.height) != (self.width, self.height) {
             let expected = format!("{} x {} pixels, the size of the maps", self.width, self.height);
             return Err(Failure::argument(name, format!("{} x {}", image.width, image.height), expected));
         }
-        // SAFETY: as promised by the caller.
-        unsafe { image.picture(name) }
+        Ok(image)
     }
 }
 
@@ -135,6 +159,10 @@ pub unsafe extern "C" fn skep_fuse(
             )
         };
         options.check()?;
+        for (index, view) in views.iter().enumerate() {
+            // SAFETY: as the header demands of the caller.
+            unsafe { view.check(&format!("views[{index}]")) }?;
+        }
         let own: Vec<Own> = (views.iter().enumerate())
             // SAFETY: as the header demands of the caller.
             .map(|(index, view)| unsafe { view.copied(&format!("views[{index}]")) })

@@ -3,6 +3,7 @@
 use super::status::{Failure, SKEP_ERR_NULL};
 use crate::geometry::Camera;
 use crate::image::Picture;
+use crate::memory::require_memory;
 use std::ffi::c_void;
 
 /// Gray. A format is a layout of channels of 8 bits, plus SKEP_FORMAT_16 or SKEP_FORMAT_FLOAT for other
@@ -156,6 +157,14 @@ pub fn check_size((width, height): (u32, u32), of: &str) -> Result<(), Failure> 
 }
 
 impl skep_image {
+    /// Refuses an image that [`Self::picture`] would refuse before it looks at a pixel.
+    pub fn check(&self, name: &str) -> Result<(), Failure> {
+        let (layout, depth) = format(self.format, name)?;
+        check_size((self.width, self.height), &format!("{name}."))?;
+        let row_bytes = self.width as usize * layout.channels * depth.bytes();
+        check_rows(self.data, row_bytes, self.height, self.stride_bytes, &format!("{name}.data"))
+    }
+
     /// A copy of the image; `name` is how an error calls it.
     ///
     /// # Safety
@@ -168,6 +177,9 @@ impl skep_image {
         // SAFETY: as promised by the caller.
         let rows =
             unsafe { rows(self.data, row_bytes, self.height, self.stride_bytes, &format!("{name}.data")) }?;
+        // The gray values, the colors, and these once more while they grow.
+        let bytes = 8 * u64::from(self.width) * u64::from(self.height);
+        require_memory(bytes, format!("a copy of {name}"))?;
         let pixels = rows.enumerate().flat_map(|(row, bytes)| {
             bytes.chunks_exact(pixel_bytes).enumerate().map(move |(column, pixel)| (column, row, pixel))
         });

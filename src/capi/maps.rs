@@ -2,6 +2,7 @@
 
 use super::image::{check_rows, rows};
 use super::status::Failure;
+use crate::memory::require_memory;
 use std::ffi::c_void;
 
 /// Types of which every bit pattern is a value.
@@ -11,6 +12,16 @@ impl Plain for u8 {}
 impl Plain for u16 {}
 impl Plain for u32 {}
 impl Plain for [f32; 3] {}
+
+/// Refuses a map that [`read`] would refuse: for callers who read several maps, before the first is copied.
+pub fn check<T: Plain>(
+    data: *const T,
+    (width, height): (u32, u32),
+    stride_bytes: usize,
+    name: &str,
+) -> Result<(), Failure> {
+    check_rows(data.cast::<c_void>(), width as usize * size_of::<T>(), height, stride_bytes, name)
+}
 
 /// A copy of a map of `width` x `height` values.
 ///
@@ -23,9 +34,11 @@ pub unsafe fn read<T: Plain>(
     name: &str,
 ) -> Result<Vec<T>, Failure> {
     let row_bytes = width as usize * size_of::<T>();
-    let mut values = vec![T::default(); width as usize * height as usize];
     // SAFETY: as promised by the caller.
     let rows = unsafe { rows(data.cast::<c_void>(), row_bytes, height, stride_bytes, name) }?;
+    let pixels = width as usize * height as usize;
+    require_memory((pixels * size_of::<T>()) as u64, format!("a copy of {name}"))?;
+    let mut values = vec![T::default(); pixels];
     for (row, into) in rows.zip(values.chunks_exact_mut((width as usize).max(1))) {
         // SAFETY: both hold `row_bytes` bytes, and any bits are a value of `T`.
         unsafe { into.as_mut_ptr().cast::<u8>().copy_from_nonoverlapping(row.as_ptr(), row_bytes) }

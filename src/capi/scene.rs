@@ -7,6 +7,7 @@ use super::pointers::{self, destroy, get, out, slice, text, wanted_one};
 use super::scene_state::{CheckedScene, SceneState};
 use super::status::{Failure, guard, skep_status};
 use crate::geometry::DepthRange;
+use crate::memory::require_memory;
 use crate::scene::{Scene, SparsePoint, View};
 use glam::DVec3;
 use std::ffi::c_char;
@@ -113,8 +114,7 @@ pub unsafe extern "C" fn skep_scene_add_view(
         // SAFETY: as the header demands of the caller.
         let (scene, image, camera) =
             unsafe { (get(scene, "scene")?, get(image, "image")?, get(camera, "camera")?) };
-        // SAFETY: as the header demands of the caller.
-        let picture = unsafe { image.picture("image") }?.into();
+        image.check("image")?;
         let camera = camera.sized((image.width, image.height), "camera")?;
         let name = match name_or_null.is_null() {
             true => None,
@@ -123,6 +123,8 @@ pub unsafe extern "C" fn skep_scene_add_view(
         };
         // SAFETY: as the header demands of the caller.
         let place = unsafe { wanted_one(view_out, "view_out") }?;
+        // SAFETY: as the header demands of the caller.
+        let picture = unsafe { image.picture("image") }?.into();
         let mut state = pointers::write(&scene.inner)?;
         let index = state.views().len();
         let name = name.unwrap_or_else(|| format!("view{index:04}.png"));
@@ -257,6 +259,8 @@ pub unsafe extern "C" fn skep_scene_add_points(
             )
         };
         let mut rest = views;
+        // A point and the list of its views.
+        require_memory(64 * count as u64 + 4 * view_total as u64, "a copy of the points")?;
         let mut points = Vec::with_capacity(count);
         for (index, (position, &seen)) in positions.iter().zip(view_counts).enumerate() {
             let position = DVec3::from_array(*position);

@@ -12,6 +12,8 @@ use crate::options::FusionOptions;
 use glam::DVec3;
 use rayon::prelude::*;
 
+/// Fraction of the time of a fusion that the comparison takes: it reads all maps once more.
+pub(super) const SHARE: f64 = 0.25;
 /// Of so many rows and columns one is compared, of fewer in large images.
 const MIN_STEP: usize = 8;
 /// Pixels of a view that are compared, about.

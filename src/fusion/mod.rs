@@ -10,6 +10,7 @@ mod cloud;
 mod exposure;
 mod overlap;
 mod source;
+mod streamed;
 
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
@@ -24,6 +25,7 @@ pub use overlap::overlaps;
 use rayon::prelude::*;
 use source::{Comparison, Source};
 use std::sync::atomic::{AtomicU64, Ordering};
+pub(crate) use streamed::{LoadedView, StreamedViews, streamed_bytes};
 
 /// A view with its maps: the input of [`fuse`].
 #[derive(Debug, Clone, Copy)]
@@ -169,14 +171,19 @@ pub(crate) fn fuse_input(
     let used: Vec<Used> = (0..count).map(|view| Used::none_of(input.camera(view).pixels())).collect();
     let total_rows: u64 = (0..count).map(|view| u64::from(input.camera(view).height)).sum();
     let mut rows_done = 0;
-    let report = |view: usize, rows_done: u64| {
-        let done = rows_done as f64 / total_rows.max(1) as f64;
+    let compared = if options.compensate_exposure { exposure::SHARE } else { 0.0 };
+    let report_share = |view: usize, done: f64| {
         let at = Progress { phase: Phase::Fusion, downscale: 1, cycle: 0, view, views: count, done };
         if progress(&at).is_break() { Err(Error::Cancelled) } else { Ok(()) }
     };
+    let report = |view: usize, rows_done: u64| {
+        report_share(view, compared + (1.0 - compared) * rows_done as f64 / total_rows.max(1) as f64)
+    };
 
     let gains = match options.compensate_exposure {
-        true => exposure::gains(input, options, |index| report(index, 0))?,
+        true => exposure::gains(input, options, |index| {
+            report_share(index, compared * index as f64 / count as f64)
+        })?,
         false => vec![DVec3::ONE; count],
     };
     for index in 0..count {

@@ -6,6 +6,7 @@
 use super::Grid;
 use crate::error::{Error, Result};
 use glam::{DMat3, DVec2, DVec3};
+use std::ops::RangeInclusive;
 
 /// A calibrated pinhole camera without skew or distortion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,6 +33,13 @@ impl Camera {
     /// Largest width and height of an image, in pixels.
     pub const MAX_SIDE: u32 = 32_768;
 
+    /// Smallest and largest focal length, in pixels: no lens is beyond, and angles stay exact.
+    pub const FOCAL_LENGTHS: RangeInclusive<f64> = 1e-3..=1e9;
+    /// Largest distance of the principal point from the top-left pixel along x and y, in pixels.
+    pub const MAX_PRINCIPAL_POINT: f64 = 1e9;
+    /// Largest component of the translation, in world units: its square is finite in f32.
+    pub const MAX_TRANSLATION: f64 = 1e18;
+
     /// Returns an error unless every field is in its valid range; `name` names the camera in the error.
     pub fn check(&self, name: &str) -> Result<()> {
         for (field, side) in [("width", self.width), ("height", self.height)] {
@@ -41,21 +49,21 @@ impl Camera {
             }
         }
         for (field, focal) in [("fx", self.fx), ("fy", self.fy)] {
-            if !(focal.is_finite() && focal > 0.0) {
-                return Err(Error::argument(
-                    format!("{name}.{field}"),
-                    focal,
-                    "a finite focal length above 0",
-                ));
+            if !Self::FOCAL_LENGTHS.contains(&focal) {
+                let expected = "a finite focal length above 0, of 0.001 to 1e9 pixels";
+                return Err(Error::argument(format!("{name}.{field}"), focal, expected));
             }
         }
         for (field, value) in [("cx", self.cx), ("cy", self.cy)] {
-            if !value.is_finite() {
-                return Err(Error::argument(format!("{name}.{field}"), value, "a finite number of pixels"));
+            if value.is_nan() || value.abs() > Self::MAX_PRINCIPAL_POINT {
+                let expected = "a finite number of pixels, of -1e9 to 1e9";
+                return Err(Error::argument(format!("{name}.{field}"), value, expected));
             }
         }
-        if !self.translation.is_finite() {
-            return Err(Error::argument(format!("{name}.translation"), self.translation, "finite numbers"));
+        let is_translation = |value: f64| value.abs() <= Self::MAX_TRANSLATION;
+        if !self.translation.to_array().into_iter().all(is_translation) {
+            let expected = "finite numbers of -1e18 to 1e18";
+            return Err(Error::argument(format!("{name}.translation"), self.translation, expected));
         }
         let deviation = self.rotation * self.rotation.transpose() - DMat3::IDENTITY;
         let is_orthonormal = deviation.to_cols_array().iter().all(|e| e.abs() < 1e-4);

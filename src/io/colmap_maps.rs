@@ -106,8 +106,20 @@ pub fn read_normal_map(path: &Path) -> Result<Grid<[f32; 3]>> {
     Ok(Grid { width, height, values })
 }
 
-/// Opens a map and checks its size against the header.
+/// Width and height of a map with so many channels, from its header and the size of the file.
+pub(crate) fn map_size(path: &Path, channels: u32) -> Result<(u32, u32)> {
+    open_sized(path, channels).map(|(_, width, height)| (width, height))
+}
+
+/// Opens a map whose values are about to be read.
 fn open_map(path: &Path, channels: u32) -> Result<(FileReader, u32, u32)> {
+    let opened = open_sized(path, channels)?;
+    require_memory(opened.0.remaining(), format!("the map {}", path.display()))?;
+    Ok(opened)
+}
+
+/// Opens a map and checks its size against the header.
+fn open_sized(path: &Path, channels: u32) -> Result<(FileReader, u32, u32)> {
     let (file, width, height) = open_header(path, channels)?;
     // The product of three 32-bit numbers and 4 fits into 128 bits.
     let expected = u128::from(width) * u128::from(height) * u128::from(channels) * 4;
@@ -118,7 +130,6 @@ fn open_map(path: &Path, channels: u32) -> Result<(FileReader, u32, u32)> {
             file.remaining()
         )));
     }
-    require_memory(file.remaining(), format!("the map {}", path.display()))?;
     Ok((file, width, height))
 }
 

@@ -26,6 +26,38 @@ pub(crate) fn remove_temporary_files(folder: &Path) {
     }
 }
 
+/// Folders that were created; those that are still empty are removed when it is dropped.
+#[derive(Debug)]
+pub(crate) struct NewFolders(Vec<PathBuf>);
+
+impl NewFolders {
+    /// Creates a folder, and those above it, where there is none.
+    pub(crate) fn create(folder: &Path) -> io::Result<NewFolders> {
+        let is_missing = |folder: &&Path| !folder.as_os_str().is_empty() && !folder.exists();
+        // The innermost first.
+        let new = folder.ancestors().take_while(is_missing).map(Path::to_owned).collect();
+        // Also if only some of them can be created, those are removed.
+        let new = NewFolders(new);
+        std::fs::create_dir_all(folder).map(|()| new)
+    }
+}
+
+impl Drop for NewFolders {
+    fn drop(&mut self) {
+        // Fails where there is a file, or another folder with one.
+        self.0.iter().for_each(|folder| drop(std::fs::remove_dir(folder)));
+    }
+}
+
+/// Returns an error if something that is no file is where a file is about to be written.
+pub(crate) fn check_file_place(path: &Path) -> Result<()> {
+    match std::fs::metadata(path) {
+        Ok(found) if found.is_dir() => Err(cannot_be_written(path, "a folder has this name")),
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(cannot_be_written(path, error)),
+        _ => Ok(()),
+    }
+}
+
 /// Writes a file under a temporary name in the same folder and renames it; a missing folder is created.
 pub fn write_file(
     path: &Path,
@@ -63,11 +95,13 @@ pub(crate) fn cannot_be_written(path: &Path, error: impl std::fmt::Display) -> E
 /// Whether the files of a view of this name lie inside their folder.
 pub(crate) fn stays_inside(name: &str) -> bool {
     let is_below = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
-    !name.is_empty() && is_below && !name.contains(char::is_control)
+    // `components` skips what means nothing: `a//b` and `a/./b` would be other names of the file `a/b`.
+    let is_plain = name.split('/').all(|part| !part.is_empty() && part != ".");
+    is_plain && is_below && !name.contains(char::is_control)
 }
 
 /// What [`stays_inside`] requires, for error texts.
-pub(super) const NAME_INSIDE: &str = "a path below the folder of images, without `..`";
+pub(super) const NAME_INSIDE: &str = "a path below the folder of images, without `..`, `.` or empty parts";
 
 /// Copies a file atomically.
 pub(crate) fn copy_file(from: &Path, to: &Path) -> Result<()> {

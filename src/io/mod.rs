@@ -7,13 +7,17 @@ mod colmap_maps;
 mod colmap_model;
 mod files;
 mod fingerprint;
+mod jpeg_end;
 mod picture_formats;
 mod pictures;
+mod places;
 mod ply;
 mod previews;
 mod scene_folder;
 mod workspace;
+mod workspace_maps;
 
+pub(crate) use colmap_maps::map_size;
 pub use colmap_maps::{
     ConsistencyGraph, Grid, read_consistency_graph, read_depth_map, read_normal_map, write_consistency_graph,
     write_depth_map, write_normal_map,
@@ -21,7 +25,8 @@ pub use colmap_maps::{
 pub use colmap_model::{ColmapModel, ModelImage};
 pub use files::write_file;
 pub(crate) use files::{
-    cannot_be_read, cannot_be_written, link_or_copy, remove_temporary_files, stays_inside,
+    NewFolders, cannot_be_read, cannot_be_written, check_file_place, link_or_copy, remove_temporary_files,
+    stays_inside,
 };
 pub(crate) use fingerprint::{Fingerprint, fingerprint, fingerprint_file, text};
 pub(crate) use picture_formats::{
@@ -34,4 +39,5 @@ pub(crate) use ply::{CloudWriter, visibility_path};
 pub use ply::{read_ply, read_visibility, write_ply, write_visibility};
 pub use previews::{write_depth_preview, write_fraction_preview, write_normal_preview, write_views_preview};
 pub use scene_folder::{SceneFolder, read_scene, write_scene};
-pub use workspace::{MapKind, Workspace, WorkspaceMaps, WorkspaceView};
+pub use workspace::{MapKind, Workspace};
+pub use workspace_maps::{WorkspaceMaps, WorkspaceView};

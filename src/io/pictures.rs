@@ -1,12 +1,15 @@
 //! Photographs from PNG and JPEG files, and to PNG files.
 
 use super::files::{cannot_be_read, write_file};
+use super::jpeg_end::has_end;
 use crate::error::Result;
 use crate::geometry::Camera;
 use crate::image::Picture;
 use crate::memory::require_memory;
 use image::codecs::png::PngEncoder;
-use image::{ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageReader, Limits};
+use image::{
+    ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageFormat, ImageReader, Limits,
+};
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Seek};
 use std::path::Path;
@@ -14,6 +17,9 @@ use std::path::Path;
 /// Reads a PNG or JPEG file, color or gray, 8 or 16 bits (16 are rounded to 8). An alpha channel is dropped;
 /// nothing else is applied, neither an orientation nor a color profile: the calibration refers to the stored
 /// pixels.
+///
+/// # Errors
+/// A file that is missing, damaged or truncated.
 pub fn read_picture(path: &Path) -> Result<Picture> {
     decode(open(path)?, path)
 }
@@ -32,6 +38,23 @@ fn decode<R: BufRead + Seek>(reader: ImageReader<R>, path: &Path) -> Result<Pict
         return Picture::from_gray(width, height, image.into_luma8().into_raw());
     }
     Picture::from_rgb(width, height, image.into_rgb8().pixels().map(|pixel| pixel.0).collect())
+}
+
+/// Returns an error for a truncated JPEG file, which the decoder would fill with gray.
+fn whole<R: BufRead + Seek>(reader: ImageReader<R>, path: &Path) -> Result<ImageReader<R>> {
+    if reader.format() != Some(ImageFormat::Jpeg) {
+        return Ok(reader);
+    }
+    let mut file = reader.into_inner();
+    let found = file.rewind().and_then(|()| has_end(&mut file));
+    let is_whole = found.and_then(|is_whole| file.rewind().map(|()| is_whole));
+    match is_whole.map_err(|error| cannot_be_read(path, error))? {
+        true => Ok(limited(ImageReader::with_format(file, ImageFormat::Jpeg))),
+        false => Err(cannot_be_read(
+            path,
+            "truncated: the JPEG file ends within the image; copy the photograph again",
+        )),
+    }
 }
 
 /// Width and height of a PNG or JPEG file, from its header.
@@ -56,7 +79,7 @@ pub(super) fn decoder<'a, R: BufRead + Seek + 'a>(
     reader: ImageReader<R>,
     path: &Path,
 ) -> Result<Box<dyn ImageDecoder + 'a>> {
-    let opened = reader.into_decoder().and_then(|mut decoder| {
+    let opened = whole(reader, path)?.into_decoder().and_then(|mut decoder| {
         decoder.set_limits(limits())?;
         Ok(decoder)
     });

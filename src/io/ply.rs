@@ -1,6 +1,6 @@
 //! Fused clouds as COLMAP and viewers read them: `fused.ply` and `fused.ply.vis`.
 
-use super::files::{FileReader, cannot_be_read, cannot_be_written, temporary_file, write_file};
+use super::files::{FileReader, NewFolders, cannot_be_read, cannot_be_written, temporary_file, write_file};
 use crate::error::{Error, Result};
 use crate::fusion::{PointCloud, PointViews};
 use ply_rs_bw::parser::{Parser, Reader};
@@ -114,6 +114,8 @@ pub(crate) struct CloudWriter {
     points: BufWriter<NamedTempFile>,
     views: BufWriter<NamedTempFile>,
     count: usize,
+    /// After the files in them: what is dropped first is removed first.
+    _folders: NewFolders,
 }
 
 impl CloudWriter {
@@ -122,12 +124,15 @@ impl CloudWriter {
     /// # Errors
     /// A folder in which no file can be made.
     pub(crate) fn new(path: &Path) -> Result<CloudWriter> {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new("."));
+        let folders = NewFolders::create(folder).map_err(|error| cannot_be_written(path, error))?;
         let temporary = || -> Result<BufWriter<NamedTempFile>> {
-            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-            let file = temporary_file(folder.unwrap_or(Path::new(".")));
+            let file = temporary_file(folder);
             Ok(BufWriter::new(file.map_err(|error| cannot_be_written(path, error))?))
         };
-        Ok(CloudWriter { path: path.to_owned(), points: temporary()?, views: temporary()?, count: 0 })
+        let (points, views) = (temporary()?, temporary()?);
+        Ok(CloudWriter { path: path.to_owned(), points, views, count: 0, _folders: folders })
     }
 
     /// Adds points.
@@ -135,9 +140,21 @@ impl CloudWriter {
     /// # Errors
     /// A full disk, for example.
     pub(crate) fn add(&mut self, cloud: &PointCloud) -> Result<()> {
+        self.add_with(cloud, |view| view)
+    }
+
+    /// Adds points whose views are places in `numbers`, and writes what is there.
+    ///
+    /// # Errors
+    /// A full disk, for example.
+    pub(crate) fn add_renumbered(&mut self, cloud: &PointCloud, numbers: &[u32]) -> Result<()> {
+        self.add_with(cloud, |view| numbers[view as usize])
+    }
+
+    fn add_with(&mut self, cloud: &PointCloud, number: impl Fn(u32) -> u32) -> Result<()> {
         self.count += cloud.positions.len();
         let written = write_points(&mut self.points, cloud);
-        let written = written.and_then(|()| write_lists(&mut self.views, &cloud.views));
+        let written = written.and_then(|()| write_lists(&mut self.views, &cloud.views, number));
         written.map_err(|error| cannot_be_written(&self.path, error))
     }
 
@@ -146,7 +163,7 @@ impl CloudWriter {
     /// # Errors
     /// A full disk, for example.
     pub(crate) fn finish(self) -> Result<usize> {
-        let CloudWriter { path, points, views, count } = self;
+        let CloudWriter { path, points, views, count, _folders } = self;
         let rewound = |file: BufWriter<NamedTempFile>| -> io::Result<NamedTempFile> {
             let mut file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
             file.rewind()?;
@@ -213,17 +230,17 @@ pub fn read_ply(path: &Path) -> Result<PointCloud> {
 pub fn write_visibility(path: &Path, views: &PointViews) -> Result<()> {
     write_file(path, |out| {
         out.write_all(&(views.len() as u64).to_le_bytes())?;
-        write_lists(out, views)
+        write_lists(out, views, |view| view)
     })
 }
 
-/// Writes the lists of views without their number.
-fn write_lists(out: &mut impl Write, views: &PointViews) -> io::Result<()> {
+/// Writes the lists of views without their number; `number` gives the number of a view in the file.
+fn write_lists(out: &mut impl Write, views: &PointViews, number: impl Fn(u32) -> u32) -> io::Result<()> {
     for point in 0..views.len() {
         let views = views.get(point);
         out.write_all(&(views.len() as u32).to_le_bytes())?;
         for view in views {
-            out.write_all(&view.to_le_bytes())?;
+            out.write_all(&number(*view).to_le_bytes())?;
         }
     }
     Ok(())

@@ -3,6 +3,7 @@
 use super::colmap_model::ColmapModel;
 use super::files::{NAME_INSIDE, stays_inside};
 use super::pictures::{picture_size, read_picture, write_picture};
+use super::places::check_files;
 use crate::error::{Error, Result};
 use crate::geometry::{Camera, DepthRange};
 use crate::image::Picture;
@@ -85,19 +86,19 @@ pub fn read_scene(folder: &Path, depth_range: Option<DepthRange>) -> Result<Scen
 }
 
 /// Writes a scene as a folder: its photographs as PNG files under their views' names in `images/`, and a
-/// binary model in `sparse/`.
+/// binary model in `sparse/`. A name need not end in `.png`: readers of pictures look at the content.
 ///
 /// # Errors
-/// A view whose name does not end in `.png` or leads outside the folder; a file that cannot be written.
+/// A view whose name leads outside the folder, or is also that of a folder of another view; a file that cannot
+/// be written.
 pub fn write_scene(folder: &Path, scene: &Scene) -> Result<()> {
     for (index, view) in scene.views().iter().enumerate() {
-        let path = Path::new(&view.name);
-        let is_png = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
-        if !(stays_inside(&view.name) && is_png) {
-            let expected = format!("{NAME_INSIDE}, that ends in .png");
-            return Err(Error::argument(format!("views[{index}].name"), &view.name, expected));
+        if !stays_inside(&view.name) {
+            return Err(Error::argument(format!("views[{index}].name"), &view.name, NAME_INSIDE));
         }
     }
+    let files: Vec<PathBuf> = scene.views().iter().map(|view| Path::new("images").join(&view.name)).collect();
+    check_files(folder, &files)?;
     for view in scene.views() {
         write_picture(&folder.join("images").join(&view.name), &view.picture.load()?)?;
     }

@@ -13,9 +13,8 @@ use super::scene_folder::SceneFolder;
 use crate::error::{Error, Result};
 use crate::fusion::PointCloud;
 use crate::geometry::Camera;
-use crate::image::Picture;
 use crate::pipeline::ViewResult;
-use crate::scene::{Maps, SparsePoint};
+use crate::scene::Maps;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -224,6 +223,14 @@ impl Workspace {
         Ok(Maps { depth, normal })
     }
 
+    /// Reads the validated maps and the confidence of a view that [`Workspace::write_view`] wrote.
+    pub(crate) fn read_finished(&self, name: &str, camera: &Camera) -> Result<(Maps, Vec<f32>)> {
+        let maps = self.read_maps(name, MapKind::Validated, camera)?;
+        let path = self.confidence_map(name, MapKind::Validated);
+        let confidence = sized(&path, camera, read_depth_map(&path)?)?;
+        Ok((maps, confidence))
+    }
+
     /// The scene the workspace belongs to: its own `sparse/` (and `images/`), as COLMAP's workspaces have
     /// them, else those of the folder above it.
     pub fn find_scene(&self) -> Result<SceneFolder> {
@@ -237,79 +244,18 @@ impl Workspace {
             None => Err(own),
         })
     }
-
-    /// Reads the maps of all views of the scene, with cameras, pictures and points: the geometric maps when
-    /// any view has one, else the photometric ones, never a mixture.
-    ///
-    /// # Errors
-    /// No view with maps; a map without its other half, damaged or of another size than its camera; a damaged
-    /// picture.
-    pub fn read(&self, scene: &SceneFolder) -> Result<WorkspaceMaps> {
-        let ColmapModel { images, points } = ColmapModel::read(&scene.sparse)?;
-        let kinds = [MapKind::Validated, MapKind::Raw];
-        let has_map = |name: &str, kind| self.depth_map(name, kind).is_file();
-        let Some(kind) =
-            kinds.into_iter().find(|&kind| images.iter().any(|image| has_map(&image.name, kind)))
-        else {
-            let wanted = format!("stereo/depth_maps/{}.geometric.bin or .photometric.bin", images[0].name);
-            return Err(Error::file(&self.folder, format!("no depth maps; expected files like {wanted}")));
-        };
-        let mut missing = Vec::new();
-        let mut views = Vec::new();
-        for image in images {
-            let mut confidence = None;
-            let maps = if has_map(&image.name, kind) {
-                let path = self.confidence_map(&image.name, kind);
-                if path.is_file() {
-                    confidence = Some(sized(&path, &image.camera, read_depth_map(&path)?)?);
-                }
-                self.read_maps(&image.name, kind, &image.camera)?
-            } else {
-                missing.push(image.name.clone());
-                let pixels = image.camera.pixels();
-                Maps { depth: vec![0.0; pixels], normal: vec![[0.0; 3]; pixels] }
-            };
-            let has_picture = scene.images.join(&image.name).is_file();
-            let picture = has_picture.then(|| scene.read_picture(&image.name, &image.camera)).transpose()?;
-            views.push(WorkspaceView { name: image.name, camera: image.camera, maps, confidence, picture });
-        }
-        Ok(WorkspaceMaps { views, points, kind, missing })
-    }
-}
-
-/// A view of a workspace.
-#[derive(Debug, Clone)]
-pub struct WorkspaceView {
-    /// Its name in the model.
-    pub name: String,
-    /// Its camera.
-    pub camera: Camera,
-    /// Its maps, of the camera's size; all zeros when there are none.
-    pub maps: Maps,
-    /// The confidence of every pixel, 0 to 1; `None` without a file, as COLMAP writes none.
-    pub confidence: Option<Vec<f32>>,
-    /// Its photograph, when the file is there.
-    pub picture: Option<Picture>,
-}
-
-/// The maps of a workspace, for fusion.
-#[derive(Debug, Clone)]
-pub struct WorkspaceMaps {
-    /// All views of the model in the order of its file.
-    pub views: Vec<WorkspaceView>,
-    /// The model's points.
-    pub points: Vec<SparsePoint>,
-    /// Which maps were read.
-    pub kind: MapKind,
-    /// Names of the views without maps.
-    pub missing: Vec<String>,
 }
 
 /// The values of a map of the camera's size.
-fn sized<T>(path: &Path, camera: &Camera, grid: Grid<T>) -> Result<Vec<T>> {
-    if (grid.width, grid.height) == (camera.width, camera.height) {
-        return Ok(grid.values);
+pub(super) fn sized<T>(path: &Path, camera: &Camera, grid: Grid<T>) -> Result<Vec<T>> {
+    require_size(path, camera, (grid.width, grid.height)).map(|()| grid.values)
+}
+
+/// Returns an error unless a map has the camera's size.
+pub(super) fn require_size(path: &Path, camera: &Camera, (width, height): (u32, u32)) -> Result<()> {
+    if (width, height) == (camera.width, camera.height) {
+        return Ok(());
     }
     let expected = format!("{}x{}, the size of its camera", camera.width, camera.height);
-    Err(Error::file(path, format!("the map is {}x{}; expected {expected}", grid.width, grid.height)))
+    Err(Error::file(path, format!("the map is {width}x{height}; expected {expected}")))
 }

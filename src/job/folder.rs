@@ -12,7 +12,7 @@
 
 use super::task::Task;
 use crate::error::{Error, Result};
-use crate::io::cannot_be_written;
+use crate::io::{NewFolders, cannot_be_written};
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 
@@ -59,33 +59,104 @@ impl RunFolder {
         self.estimates().join(format!("cycle{cycle:02}-{view:05}.{stage}"))
     }
 
+    /// A file of each kind besides those of the views and the scene.
+    pub(super) fn own_files(&self) -> Vec<PathBuf> {
+        let fixed = ["fused.ply.vis", "stereo/fusion.cfg", "stereo/patch-match.cfg"];
+        let mut files: Vec<PathBuf> = fixed.iter().map(|file| self.0.join(file)).collect();
+        files.extend([
+            self.report(),
+            self.manifest(),
+            self.record(Task::Fuse),
+            self.estimate(0, 0, "checked"),
+        ]);
+        files
+    }
+
     pub(super) fn report(&self) -> PathBuf {
         self.0.join("report.json")
     }
 
-    /// Locks the run until the file is dropped; the system unlocks it when the process ends.
+    /// Locks the run until the lock is dropped; the system unlocks it when the process ends.
     ///
     /// # Errors
     /// A folder that cannot be written; another process that works on the run.
-    pub(super) fn lock(&self, access: Access) -> Result<File> {
+    pub(super) fn lock(&self, access: Access) -> Result<Lock> {
         let path = self.0.join("run").join("lock");
-        // NFS gives a shared lock only on a file that is open for reading, an exclusive one for writing.
-        let open = std::fs::create_dir_all(self.0.join("run"))
-            .and_then(|()| File::options().create(true).truncate(false).read(true).write(true).open(&path));
-        let file = open.map_err(|error| cannot_be_written(&path, error))?;
-        let locked = match access {
-            Access::Whole => file.try_lock(),
-            Access::Tasks => file.try_lock_shared(),
-        };
-        match locked {
-            Ok(()) => Ok(file),
-            Err(TryLockError::WouldBlock) => Err(Error::file(
-                &self.0,
-                "another process works on the run in this folder; wait for it, or name another folder",
-            )),
-            // Some network file systems have no locks: as safe as without one.
-            Err(TryLockError::Error(error)) if error.kind() == std::io::ErrorKind::Unsupported => Ok(file),
-            Err(TryLockError::Error(error)) => Err(cannot_be_written(&path, error)),
+        let folders =
+            NewFolders::create(&self.0.join("run")).map_err(|error| cannot_be_written(&path, error))?;
+        loop {
+            let is_new = !path.exists();
+            // NFS gives a shared lock only on a file that is open for reading, an exclusive one for writing.
+            let file = File::options().create(true).truncate(false).read(true).write(true).open(&path);
+            let file = file.map_err(|error| cannot_be_written(&path, error))?;
+            let locked = match access {
+                Access::Whole => file.try_lock(),
+                Access::Tasks => file.try_lock_shared(),
+            };
+            match locked {
+                Ok(()) => (),
+                Err(TryLockError::WouldBlock) => {
+                    return Err(Error::file(
+                        &self.0,
+                        "another process works on the run in this folder; wait for it, or name another folder",
+                    ));
+                }
+                // Some network file systems have no locks: as safe as without one.
+                Err(TryLockError::Error(error)) if error.kind() == std::io::ErrorKind::Unsupported => (),
+                Err(TryLockError::Error(error)) => return Err(cannot_be_written(&path, error)),
+            }
+            // Another process may have removed the file after it was opened here: see `Lock`.
+            if is_same_file(&file, &path) {
+                return Ok(Lock {
+                    path,
+                    _file: file,
+                    is_vain: is_new && access == Access::Whole,
+                    _folders: folders,
+                });
+            }
         }
     }
+}
+
+/// A run that is locked. One that begins nothing leaves no trace: the file of the lock and the folders above it
+/// are removed again if they were made for it.
+#[derive(Debug)]
+pub(super) struct Lock {
+    path: PathBuf,
+    /// Whether the file was made for this lock, and nothing has begun yet.
+    is_vain: bool,
+    /// Before the folders: fields are dropped in this order.
+    _file: File,
+    _folders: NewFolders,
+}
+
+impl Lock {
+    /// Keeps the file: a run begins.
+    pub(super) fn keep(&mut self) {
+        self.is_vain = false;
+    }
+}
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        if self.is_vain {
+            // While it is locked: who opened it already notices that it is gone.
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Whether an open file is the one at a path.
+#[cfg(unix)]
+fn is_same_file(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let number = |metadata: std::fs::Metadata| (metadata.dev(), metadata.ino());
+    let at_path = std::fs::metadata(path).map(number);
+    matches!((file.metadata().map(number), at_path), (Ok(own), Ok(found)) if own == found)
+}
+
+/// Elsewhere open files are not removed.
+#[cfg(not(unix))]
+fn is_same_file(_: &File, _: &Path) -> bool {
+    true
 }

@@ -1,97 +1,134 @@
-//! Fusion of maps in files, of which those of overlapping views are in memory at a time.
+//! The fusion of a run's finished views, and of the maps in any workspace.
 
-use crate::error::Result;
-use crate::fusion::{FusionInput, FusionView};
-use crate::geometry::Camera;
-use crate::image::Picture;
-use crate::io::{MapKind, Workspace, read_depth_map};
-use crate::memory::Cache;
-use crate::scene::{Maps, Scene};
-use std::collections::HashMap;
-use std::collections::hash_map::Entry;
-use std::sync::{Arc, Mutex, PoisonError};
+use super::Job;
+use super::needs::{self, BASE};
+use crate::error::{Error, Result};
+use crate::fusion::{LoadedView, StreamedViews, fuse_input, overlaps, streamed_bytes};
+use crate::io::{CloudWriter, WorkspaceMaps, check_file_place, visibility_path};
+use crate::memory::{format_bytes, require_memory};
+use crate::options::Options;
+use crate::parallel::{JoinedPool, ProgressFn, useful_threads};
+use crate::scene::SparsePoint;
+use crate::scene::is_inside;
+use glam::DVec3;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-/// The finished views of a run.
-pub(super) struct FinishedViews<'a> {
-    pub scene: &'a Scene,
-    pub workspace: &'a Workspace,
-    /// The views that may see the same surface as a view.
-    pub overlaps: &'a [Vec<u32>],
-    kept: Cache<usize, Finished>,
-    /// The views of the last group, which the next one has mostly in common.
-    last: Mutex<HashMap<usize, Arc<Finished>>>,
-}
-
-/// A view in memory.
-struct Finished {
-    maps: Maps,
-    confidence: Vec<f32>,
-    picture: Picture,
-}
-
-/// Bytes of a view in memory for each pixel: depth, normal, confidence, gray and color.
-pub(super) const BYTES_PER_PIXEL: usize = 24;
-
-impl<'a> FinishedViews<'a> {
-    /// Keeps the views used last, of up to `limit` bytes, in memory.
-    pub(super) fn new(
-        scene: &'a Scene,
-        workspace: &'a Workspace,
-        overlaps: &'a [Vec<u32>],
-        limit: usize,
-    ) -> FinishedViews<'a> {
-        FinishedViews { scene, workspace, overlaps, kept: Cache::new(limit), last: Mutex::default() }
-    }
-
-    fn load(&self, index: usize) -> Result<Arc<Finished>> {
-        if let Some(kept) = self.kept.get(index) {
-            return Ok(kept);
-        }
-        let view = &self.scene.views()[index];
-        let maps = self.workspace.read_maps(&view.name, MapKind::Validated, &view.camera)?;
-        let confidence =
-            read_depth_map(&self.workspace.confidence_map(&view.name, MapKind::Validated))?.values;
-        let finished = Arc::new(Finished { maps, confidence, picture: view.picture.load()? });
-        self.kept.insert(index, finished.clone(), view.camera.pixels() * BYTES_PER_PIXEL);
-        Ok(finished)
-    }
-}
-
-impl FusionInput for FinishedViews<'_> {
-    fn len(&self) -> usize {
-        self.scene.views().len()
-    }
-
-    fn camera(&self, view: usize) -> &Camera {
-        &self.scene.views()[view].camera
-    }
-
-    fn overlap(&self, view: usize) -> &[u32] {
-        &self.overlaps[view]
-    }
-
-    fn with_views(&self, views: &[u32], body: &mut dyn FnMut(&[FusionView]) -> Result<()>) -> Result<()> {
-        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        // Others are dropped before any is loaded: one group at a time is in memory, besides the cache.
-        last.retain(|view, _| views.contains(&(*view as u32)));
-        for &view in views {
-            let view = view as usize;
-            if let Entry::Vacant(place) = last.entry(view) {
-                place.insert(self.load(view)?);
-            }
-        }
-        let view = |&view: &u32| {
-            let (view, finished) = (view as usize, &last[&(view as usize)]);
-            FusionView {
-                camera: self.camera(view),
-                maps: &finished.maps,
-                status: None,
-                confidence: Some(&finished.confidence),
-                picture: Some(&finished.picture),
-                overlap: self.overlap(view),
-            }
+impl Job {
+    /// Fuses the finished views into the cloud of the workspace; returns the number of points.
+    pub(super) fn fuse_finished(&self, path: &Path, progress: ProgressFn) -> Result<usize> {
+        let load = |index: usize| {
+            let view = &self.scene.views()[index];
+            let (maps, confidence) = self.workspace.read_finished(&view.name, &view.camera)?;
+            Ok(LoadedView { maps, confidence: Some(confidence), picture: Some(view.picture.load()?) })
         };
-        let group: Vec<FusionView> = views.iter().map(view).collect();
-        body(&group)
+        let cameras = self.scene.views().iter().map(|view| &view.camera).collect();
+        let views = StreamedViews::new(cameras, &self.overlaps, &load, self.shares.fusion);
+        let mut cloud = CloudWriter::new(path)?;
+        let bounds = self.options.input.bounds()?;
+        fuse_input(&views, &self.options.fusion, progress, &mut |points| match bounds {
+            Some(bounds) => cloud.add(&points.filtered(|position| is_inside(bounds, position))),
+            None => cloud.add(points),
+        })?;
+        cloud.finish()
     }
+}
+
+/// What [`fuse_workspace`] fused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FusedWorkspace {
+    /// Number of points.
+    pub points: u64,
+    /// Points that are gray: no view they were fused from has a photograph.
+    pub points_without_color: u64,
+    /// Pixels of the maps.
+    pub pixels: u64,
+    /// Pixels with a depth.
+    pub depths: u64,
+}
+
+/// Fuses the maps of a workspace, on a thread pool of its own, and writes a PLY file and the views of its
+/// points, `PATH.vis`, beside it. Of the maps and photographs only those of a view and of the views that
+/// overlap with it are in memory, and as many others as the option `memory` allows; of the other options the
+/// fusion's and `threads` count.
+///
+/// # Errors
+/// An option out of its range; less memory than the fusion needs; threads that cannot be started; a map or
+/// photograph that is missing or damaged; a file that cannot be written; [`Error::Cancelled`].
+pub fn fuse_workspace(
+    maps: &WorkspaceMaps,
+    options: &Options,
+    path: &Path,
+    progress: ProgressFn,
+) -> Result<FusedWorkspace> {
+    options.check()?;
+    for file in cloud_files(path) {
+        check_file_place(&file)?;
+    }
+    maps.check_sizes()?;
+    let pool = JoinedPool::new(useful_threads(options.threads, usize::MAX))?;
+    pool.install(|| fuse_on_pool(maps, options, path, progress))
+}
+
+fn fuse_on_pool(
+    maps: &WorkspaceMaps,
+    options: &Options,
+    path: &Path,
+    progress: ProgressFn,
+) -> Result<FusedWorkspace> {
+    // Views without maps are left out, so that they take neither memory nor places among the views that one is
+    // compared with.
+    let used: Vec<usize> = (0..maps.views.len()).filter(|&view| maps.views[view].has_maps).collect();
+    let cameras: Vec<_> = used.iter().map(|&view| &maps.views[view].camera).collect();
+    let centers: Vec<DVec3> = cameras.iter().map(|camera| camera.center()).collect();
+    let overlaps = overlaps(&centers, &points_of(maps, &used));
+    let least = BASE + needs::point_bytes(&maps.points) + streamed_bytes(&cameras, &overlaps);
+    let memory = needs::budget(options);
+    if memory < least {
+        let expected = format!("at least {} for these maps ({least} bytes)", format_bytes(least));
+        return Err(Error::argument("options.memory", format_bytes(memory), expected));
+    }
+    require_memory(least - BASE, "the fusion of a view with those that overlap it")?;
+
+    let depths = AtomicU64::new(0);
+    let is_counted: Vec<AtomicBool> = used.iter().map(|_| AtomicBool::new(false)).collect();
+    let load = |index: usize| {
+        let view = maps.load(used[index])?;
+        // A view may be loaded again.
+        if !is_counted[index].swap(true, Ordering::Relaxed) {
+            let own = view.maps.depth.iter().filter(|&&depth| depth > 0.0).count();
+            depths.fetch_add(own as u64, Ordering::Relaxed);
+        }
+        Ok(view)
+    };
+    let pixels = cameras.iter().map(|camera| camera.pixels() as u64).sum();
+    let views = StreamedViews::new(cameras, &overlaps, &load, (memory - least) as usize);
+    let numbers: Vec<u32> = used.iter().map(|&view| view as u32).collect();
+    let mut cloud = CloudWriter::new(path)?;
+    let mut points_without_color = 0;
+    fuse_input(&views, &options.fusion, progress, &mut |points| {
+        let is_gray = |&point: &usize| {
+            points.views.get(point).iter().all(|&view| !maps.views[used[view as usize]].has_photograph)
+        };
+        points_without_color += (0..points.views.len()).filter(is_gray).count() as u64;
+        cloud.add_renumbered(points, &numbers)
+    })?;
+    let points = cloud.finish()? as u64;
+    Ok(FusedWorkspace { points, points_without_color, pixels, depths: depths.into_inner() })
+}
+
+/// The sparse points with the views' places in `used`; other views are left out.
+fn points_of(maps: &WorkspaceMaps, used: &[usize]) -> Vec<SparsePoint> {
+    let mut places = vec![None; maps.views.len()];
+    used.iter().enumerate().for_each(|(place, &view)| places[view] = Some(place as u32));
+    let renumbered = |point: &SparsePoint| SparsePoint {
+        position: point.position,
+        views: point.views.iter().filter_map(|&view| places[view as usize]).collect(),
+    };
+    maps.points.iter().map(renumbered).collect()
+}
+
+/// The PLY file of a cloud and that of the views of its points.
+pub(super) fn cloud_files(path: &Path) -> Vec<PathBuf> {
+    vec![path.to_owned(), visibility_path(path)]
 }

@@ -21,25 +21,25 @@ mod run;
 mod task;
 
 use crate::error::{Error, Result};
-use crate::fusion::{fuse_input, overlaps};
+use crate::fusion::overlaps;
 use crate::geometry::DepthRange;
 use crate::import::prepare;
-use crate::io::{CloudWriter, Workspace, visibility_path};
+use crate::io::Workspace;
 use crate::memory::require_memory;
 use crate::options::Options;
 use crate::parallel::{JoinedPool, ProgressFn, useful_threads};
 use crate::pipeline::{Checked, CheckedEstimates, CycleRecord, Stepper, ViewEstimate, thread_count};
-use crate::scene::{Scene, is_inside};
+use crate::scene::Scene;
 use estimates::Estimates;
-use folder::{Access, RunFolder};
-use fuse::FinishedViews;
+use folder::{Access, Lock, RunFolder};
+use fuse::cloud_files;
+pub use fuse::{FusedWorkspace, fuse_workspace};
 use glam::DVec3;
 use manifest::Manifest;
 pub use maps::check_maps;
 pub use needs::Needs;
 use needs::{Least, Shares};
 pub use run::Summary;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use task::{Content, Record};
 pub use task::{Task, ViewSummary};
@@ -72,7 +72,7 @@ pub struct Job {
     shares: Shares,
     notices: Vec<String>,
     /// Locked until the job is dropped.
-    _lock: File,
+    lock: Lock,
 }
 
 impl Job {
@@ -97,17 +97,19 @@ impl Job {
     ) -> Result<Job> {
         options.check()?;
         let folder = RunFolder::new(folder);
+        // Dropped last if the run is refused: it removes what was made for it.
         let lock = folder.lock(Access::Whole)?;
         // How much work there is is known from the scene alone.
         let pool = JoinedPool::new(useful_threads(options.threads, usize::MAX))?;
         let prepared = pool.install(|| prepare(scene, &options.input, folder.root(), progress))?;
-        let plan = pool.install(|| plan::read(&prepared, depth_range, options, progress))?;
+        let plan = pool.install(|| plan::read(&prepared, depth_range, options, &folder, progress))?;
         let run = plan.manifest.run();
         let mut job = pool.install(|| Job::new(folder, plan.scene, options, run, lock))?;
         job.needs.require(job.needs.least_memory)?;
         // Last: a run that cannot begin leaves the folder as it was.
         job.notices = plan::prepare(&job.folder, &prepared.folder, &job.scene, &plan.manifest, fresh)?;
         job.notices.splice(..0, prepared.warnings);
+        job.lock.keep();
         Ok(job)
     }
 
@@ -132,7 +134,7 @@ impl Job {
         pool.install(|| Job::new(folder, scene, &options, manifest.run(), lock))
     }
 
-    fn new(folder: RunFolder, scene: Scene, options: &Options, run: u64, lock: File) -> Result<Job> {
+    fn new(folder: RunFolder, scene: Scene, options: &Options, run: u64, lock: Lock) -> Result<Job> {
         // The first stepper knows the source views, from which the limit of the images follows.
         let planned = Stepper::with_image_limit(&scene, options, 0)?;
         let centers: Vec<DVec3> = scene.views().iter().map(|view| view.camera.center()).collect();
@@ -151,7 +153,7 @@ impl Job {
             needs,
             shares,
             notices: Vec::new(),
-            _lock: lock,
+            lock,
         })
     }
 
@@ -381,17 +383,8 @@ impl Job {
             }
         }
         self.estimates.forget();
-        let limit = self.shares.fusion;
-        let views = FinishedViews::new(&self.scene, &self.workspace, &self.overlaps, limit);
         let path = self.workspace.cloud();
-        let mut cloud = CloudWriter::new(&path)?;
-        let bounds = self.options.input.bounds()?;
-        fuse_input(&views, &self.options.fusion, progress, &mut |points| match bounds {
-            Some(bounds) => cloud.add(&points.filtered(|position| is_inside(bounds, position))),
-            None => cloud.add(points),
-        })?;
-        let points = cloud.finish()?;
-        let visibility = visibility_path(&path);
-        Ok((Content::Fuse(points), vec![path, visibility]))
+        let points = self.fuse_finished(&path, progress)?;
+        Ok((Content::Fuse(points), cloud_files(&path)))
     }
 }

@@ -2,17 +2,18 @@
 
 use super::estimates::{PLANE_BYTES, SURFACE_BYTES};
 use crate::error::{Error, Result};
+use crate::fusion::streamed_bytes;
 use crate::memory::{available_memory, format_bytes};
 use crate::options::Options;
 use crate::pipeline::{Stepper, thread_count};
-use crate::scene::Scene;
+use crate::scene::{Scene, SparsePoint};
 
 /// Fraction of the available memory that a run takes by default.
 const DEFAULT_FRACTION: f64 = 0.75;
 /// Memory where the system does not tell how much there is.
 const DEFAULT_MEMORY: u64 = 4 << 30;
 /// Memory of the program, its threads and allocator, before any image.
-const BASE: u64 = 192 << 20;
+pub(super) const BASE: u64 = 192 << 20;
 /// Bytes for each pixel of a view that its search takes besides images and estimates: the planes found, view
 /// sets and candidates.
 const SEARCH_BYTES: u64 = 110;
@@ -91,13 +92,9 @@ pub(super) fn budget(options: &Options) -> u64 {
     }
 }
 
-/// Bytes that the fusion needs: a view and those it is compared with, at the same time.
-fn fusion_bytes(scene: &Scene, overlaps: &[Vec<u32>]) -> u64 {
-    let bytes =
-        |view: usize| scene.views()[view].camera.pixels() as u64 * super::fuse::BYTES_PER_PIXEL as u64;
-    let group =
-        |view: usize| bytes(view) + overlaps[view].iter().map(|&other| bytes(other as usize)).sum::<u64>();
-    (0..scene.views().len()).map(group).max().unwrap_or(0)
+/// Bytes of sparse points in memory.
+pub(super) fn point_bytes(points: &[SparsePoint]) -> u64 {
+    points.iter().map(|point| 48 + 4 * point.views.len() as u64).sum()
 }
 
 /// Bytes of the largest task: a view with what it reads of other views.
@@ -128,11 +125,10 @@ pub(super) fn needs(
     let threads = thread_count(scene, options);
     let pixels: u64 = scene.views().iter().map(|view| view.camera.pixels() as u64).sum();
     let task = largest_task(scene, stepper);
-    let observations: u64 = scene.points().iter().map(|point| 48 + 4 * point.views.len() as u64).sum();
-    let base = BASE + observations;
-    // One bit of each pixel tells the fusion what is part of a point already. Not part of the base: of many
-    // views it is more than another task takes.
-    let fusion = fusion_bytes(scene, overlaps) + pixels / 8;
+    let base = BASE + point_bytes(scene.points());
+    // With a bit of each pixel of all views, which of many views is more than another task takes.
+    let cameras: Vec<_> = scene.views().iter().map(|view| &view.camera).collect();
+    let fusion = streamed_bytes(&cameras, overlaps);
     let least = Least { base, view: task, fusion };
     let memory = budget(options);
     // As many tasks at a time as keep the threads busy, and fit.

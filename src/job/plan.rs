@@ -30,15 +30,27 @@ pub(super) struct Plan {
 /// Reads a scene and decodes each photograph once: a damaged one is found now and not after hours.
 ///
 /// # Errors
-/// A file that is missing, damaged, or not of its camera's size; [`Error::Cancelled`].
+/// A file that is missing, damaged, or not of its camera's size; one of the run that could not be written;
+/// [`Error::Cancelled`].
 pub(super) fn read(
     prepared: &Prepared,
     depth_range: Option<DepthRange>,
     options: &Options,
+    run: &RunFolder,
     progress: ProgressFn,
 ) -> Result<Plan> {
     let folder = &prepared.folder;
     let model = ColmapModel::read(&folder.sparse)?;
+    let mut others = run.own_files();
+    let (images, sparse) = (run.root().join("images"), run.root().join("sparse"));
+    if !is_same(&images, &folder.images) {
+        others.extend(model.images.iter().map(|image| images.join(&image.name)));
+    }
+    if !is_same_model(&sparse, folder) {
+        others.push(sparse.join("cameras.bin"));
+    }
+    let names = model.images.iter().map(|image| image.name.as_str());
+    Workspace::new(run.root()).check_places_and(names, others)?;
     let tracker = Tracker::with_work(progress, model.images.len() as u64);
     let advance = |units, view| {
         let (phase, views) = (Phase::Read, model.images.len());
@@ -231,7 +243,7 @@ fn adopt(folder: &RunFolder, scene: &SceneFolder, manifest: &Manifest) -> Result
         }
     }
     let sparse = folder.root().join("sparse");
-    if is_same(&sparse, &scene.sparse) || is_same(&sparse.join("0"), &scene.sparse) {
+    if is_same_model(&sparse, scene) {
         return Ok(());
     }
     // A model is a set of files: those of another one must not stay beside it.
@@ -249,6 +261,11 @@ fn adopt(folder: &RunFolder, scene: &SceneFolder, manifest: &Manifest) -> Result
         }
     }
     Ok(())
+}
+
+/// Whether the model of a scene is in this folder `sparse`, or in `sparse/0`.
+fn is_same_model(sparse: &Path, scene: &SceneFolder) -> bool {
+    is_same(sparse, &scene.sparse) || is_same(&sparse.join("0"), &scene.sparse)
 }
 
 /// Whether two paths are the same folder.

@@ -27,17 +27,58 @@ pub(super) fn results(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     all.map(|path| (path.clone(), std::fs::read(folder.join(path)).unwrap())).collect()
 }
 
+/// Whether the tests, and so the commands they start, ignore a signal: `nohup` and `&` of scripts ask for that.
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.is_some_and(|mask| u64::from_str_radix(mask.trim(), 16).unwrap() >> (signal - 1) & 1 == 1)
+}
+
 #[test]
-fn ctrl_c_and_sigterm_end_with_status_130_and_say_how_to_go_on() {
-    for signal in ["-INT", "-TERM"] {
+fn each_signal_ends_with_its_status_and_says_how_to_go_on() {
+    for (signal, expected) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
+        if is_ignored(expected - 128) {
+            continue;
+        }
         let (output, board) = (TempDir::new().unwrap(), board());
         let arguments = ["reconstruct", board.to_str().unwrap(), "--output", path(&output)];
         let (status, printed) = interrupted(&arguments, "search", signal);
-        assert_eq!(status, Some(130), "{printed}");
+        assert_eq!(status, Some(expected), "{printed}");
         assert!(printed.contains("interrupted") && printed.contains("the same command goes on"), "{printed}");
         assert!(!output.path().join("report.json").exists(), "only finished runs have a report");
         assert!(!output.path().join("fused.ply").exists());
     }
+}
+
+#[test]
+fn an_interruption_while_photographs_are_read_leaves_nothing() {
+    let (folder, scene) = (TempDir::new().unwrap(), board());
+    let dense = folder.path().join("new/dense");
+    let arguments = ["reconstruct", scene.to_str().unwrap(), "--output", dense.to_str().unwrap()];
+    let (status, printed) = interrupted(&arguments, "read", "-TERM");
+    assert_eq!(status, Some(143), "{printed}");
+    if printed.contains("nothing was changed") {
+        assert!(!folder.path().join("new").exists());
+    }
+}
+
+/// As `nohup` and the `&` of a script have it.
+#[test]
+#[cfg(target_os = "linux")]
+fn signals_that_are_ignored_at_the_start_stay_ignored() {
+    let (scene, output) = (small_board(), TempDir::new().unwrap());
+    let mut shell = Command::new("sh");
+    shell.args(["-c", "trap '' INT HUP; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_skep")]);
+    shell.args(["reconstruct", path(&scene), "--preset", "fast", "--output", path(&output)]);
+    let mut process = shell.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(process.stderr.take().unwrap()).lines().map(|line| line.unwrap());
+    assert!(lines.by_ref().any(|line| line.starts_with("search")));
+    for signal in ["-INT", "-HUP"] {
+        assert!(Command::new("kill").args([signal, &process.id().to_string()]).status().unwrap().success());
+    }
+    let printed = lines.collect::<Vec<_>>().join("\n");
+    assert!(process.wait().unwrap().success(), "{printed}");
+    assert!(output.path().join("fused.ply").is_file());
 }
 
 #[test]

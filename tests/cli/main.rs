@@ -2,10 +2,13 @@
 #![cfg(feature = "cli")]
 
 mod dump;
+mod fuse;
 mod import;
 #[cfg(unix)]
 mod interruption;
 mod layouts;
+mod progress;
+mod refusals;
 mod run_folder;
 
 use layouts::{check_cloud, check_maps};
@@ -346,11 +349,15 @@ fn check_summary(printed: &str, dense: &Path, points: usize) {
     }
 }
 
-/// Checks that without a terminal each new step prints one line.
+/// Checks that without a terminal each new step prints a line.
 fn check_lines(printed: &str) {
     let steps: Vec<&str> = printed.lines().filter_map(|line| line.split(", 7 views:").next()).collect();
     assert!(steps.iter().any(|step| step.starts_with("search")), "{printed}");
     assert!(steps.contains(&"fusion"), "{printed}");
-    assert!(steps.windows(2).all(|pair| pair[0] != pair[1]), "a step is announced once:\n{printed}");
+    // A step that takes long has several lines, but none comes back.
+    let mut order = steps.clone();
+    order.dedup();
+    let different: std::collections::HashSet<&str> = steps.into_iter().collect();
+    assert_eq!(order.len(), different.len(), "{printed}");
     assert!(!printed.contains('\r') && !printed.contains('\u{1b}'), "no bar without a terminal:\n{printed}");
 }

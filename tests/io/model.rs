@@ -265,3 +265,41 @@ fn half_turns_keep_their_pose() {
     half_turns.write_binary(folder.path()).unwrap();
     assert_close(&ColmapModel::read(folder.path()).unwrap(), &half_turns);
 }
+
+#[test]
+fn text_of_other_encodings_is_read_or_refused_with_its_line() {
+    let folder = tempdir().unwrap();
+    model().write_text(folder.path()).unwrap();
+    let (cameras, images) = (folder.path().join("cameras.txt"), folder.path().join("images.txt"));
+    for file in [&cameras, &images, &folder.path().join("points3D.txt")] {
+        rewrite(file, |bytes| drop(bytes.splice(0..0, [0xef, 0xbb, 0xbf])));
+    }
+    assert_eq!(ColmapModel::read(folder.path()).unwrap().images.len(), 2, "with byte order marks");
+
+    let text = std::fs::read_to_string(&images).unwrap();
+    let units = |text: &str| text.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<u8>>();
+    std::fs::write(&images, units(&text)).unwrap();
+    assert_refused(ColmapModel::read(folder.path()), &["images.txt, line 1", "UTF-16", "save it as UTF-8"]);
+    std::fs::write(&images, units(text.trim_start_matches('\u{feff}'))).unwrap();
+    assert_refused(ColmapModel::read(folder.path()), &["images.txt, line 1", "UTF-16", "save it as UTF-8"]);
+    let latin = text.replace("left.png", "l?ft.png");
+    let latin: Vec<u8> = latin.bytes().map(|byte| if byte == b'?' { 0xe9 } else { byte }).collect();
+    std::fs::write(&images, latin).unwrap();
+    assert_refused(ColmapModel::read(folder.path()), &["images.txt, line 3", "0xe9 is not UTF-8", "Latin-1"]);
+}
+
+#[test]
+fn cameras_beyond_sensible_bounds_are_refused_with_the_bounds() {
+    let refused = |change: &dyn Fn(&mut skep::geometry::Camera), parts: &[&str]| {
+        let folder = tempdir().unwrap();
+        let mut model = model();
+        model.images.iter_mut().for_each(|image| change(&mut image.camera));
+        model.points.clear();
+        model.write_text(folder.path()).unwrap();
+        assert_refused(ColmapModel::read(folder.path()), parts);
+    };
+    refused(&|camera| camera.fx = 1e-30, &["cameras.txt, line", "fx", "0.001 to 1e9"]);
+    refused(&|camera| camera.fy = 1e30, &["cameras.txt, line", "fy", "0.001 to 1e9"]);
+    refused(&|camera| camera.cx = -1e30, &["cameras.txt, line", "cx", "-1e9 to 1e9"]);
+    refused(&|camera| camera.translation.y = 1e134, &["images.txt, line", "translation", "1e18"]);
+}

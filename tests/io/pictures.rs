@@ -44,6 +44,19 @@ fn jpeg_is_read_whatever_its_name() {
 }
 
 #[test]
+fn a_truncated_jpeg_is_refused_and_trailing_bytes_are_not() {
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("picture.jpg");
+    let image: ImageBuffer<Luma<u8>, _> = ImageBuffer::from_fn(64, 64, |x, y| Luma([(x * y * 37) as u8]));
+    image.save(&path).unwrap();
+    crate::rewrite(&path, |bytes| bytes.extend_from_slice(b"\0\0trailer"));
+    let whole = read_picture(&path).unwrap();
+    crate::rewrite(&path, |bytes| bytes.truncate(bytes.len() * 2 / 5));
+    assert_refused(read_picture(&path), &["picture.jpg", "truncated"]);
+    assert_eq!(whole.width(), 64);
+}
+
+#[test]
 fn what_is_no_picture_is_refused() {
     let folder = tempdir().unwrap();
     let path = folder.path().join("picture.png");

@@ -127,27 +127,30 @@ fn a_workspace_finds_its_own_scene_or_the_one_above() {
 }
 
 #[test]
-fn all_maps_of_a_workspace_are_read_and_missing_ones_named() {
+fn the_maps_of_a_workspace_are_found_and_those_that_are_missing_too() {
     let (folder, workspace) = scene();
     let found = workspace.find_scene().unwrap();
-    assert_refused(workspace.read(&found), &["no depth maps", "left.png.geometric.bin"]);
+    assert_refused(workspace.maps(&found), &["no depth maps", "left.png.geometric.bin"]);
 
     workspace.write_view(NAME, &camera(0.5), &result()).unwrap();
     std::fs::remove_file(folder.path().join("images/left.png")).unwrap();
-    let maps = workspace.read(&found).unwrap();
-    assert_eq!(
-        (maps.kind, maps.missing.as_slice()),
-        (MapKind::Validated, ["left.png".to_owned()].as_slice())
-    );
-    assert_eq!(maps.views[0].maps.depth, [0.0; 24], "views keep their places in the file");
-    assert!(maps.views[0].picture.is_none());
-    assert_eq!(maps.views[1].maps, result().validated());
-    assert_eq!(maps.views[1].picture.as_ref().unwrap().rgb(0), [1, 50, 60]);
+    let maps = workspace.maps(&found).unwrap();
+    let has_maps: Vec<(&str, bool)> =
+        maps.views.iter().map(|view| (view.name.as_str(), view.has_maps)).collect();
+    assert_eq!(maps.kind, MapKind::Validated);
+    assert_eq!(has_maps, [("left.png", false), (NAME, true)], "views keep their places in the file");
+    assert!(!maps.views[0].has_photograph && maps.read_picture(0).unwrap().is_none());
+    maps.check_sizes().unwrap();
+    assert_eq!(maps.read_maps(1).unwrap(), result().validated());
+    assert_eq!(maps.read_picture(1).unwrap().unwrap().rgb(0), [1, 50, 60]);
+    assert!(maps.read_confidence(1).unwrap().is_some());
     assert_eq!(maps.points.len(), 3);
 
     std::fs::remove_file(workspace.depth_map(NAME, MapKind::Validated)).unwrap();
-    let maps = workspace.read(&found).unwrap();
-    assert_eq!((maps.kind, &maps.views[1].maps), (MapKind::Raw, &result().raw));
+    let maps = workspace.maps(&found).unwrap();
+    assert_eq!((maps.kind, &maps.read_maps(1).unwrap()), (MapKind::Raw, &result().raw));
+    std::fs::remove_file(workspace.normal_map(NAME, MapKind::Raw)).unwrap();
+    assert_refused(maps.check_sizes(), &["normal_maps", "photometric.bin", "cannot be read"]);
 }
 
 #[test]

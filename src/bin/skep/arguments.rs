@@ -1,7 +1,8 @@
 //! The arguments of the command line, and their help.
 
+use crate::progress::Messages;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use skep::{DepthRange, FusionOptions, Options, Result};
+use skep::{DepthRange, Options, Result};
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -81,9 +82,8 @@ pub struct Run {
     /// Begin anew where a run in the folder would go on
     #[arg(long)]
     pub fresh: bool,
-    /// Print warnings and errors only
-    #[arg(short, long)]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub messages: Messages,
 }
 
 /// What is taken from the scene.
@@ -167,9 +167,8 @@ pub struct Planned {
     pub folder: PathBuf,
     #[command(flatten)]
     pub resources: Resources,
-    /// Print warnings and errors only
-    #[arg(short, long)]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub messages: Messages,
 }
 
 #[derive(Args)]
@@ -267,9 +266,8 @@ pub struct Fuse {
     min_confidence: Option<f64>,
     #[command(flatten)]
     pub resources: Resources,
-    /// Print warnings and errors only
-    #[arg(short, long)]
-    pub quiet: bool,
+    #[command(flatten)]
+    pub messages: Messages,
 }
 
 impl Run {
@@ -321,9 +319,9 @@ impl Fuse {
         changes_nothing && self.scene.is_none() && self.output.is_none() && is_run
     }
 
-    /// The options of the fusion.
-    pub fn options(&self) -> Result<FusionOptions> {
-        let mut options = Options::default();
+    /// The options of the fusion, its threads and memory.
+    pub fn options(&self) -> Result<Options> {
+        let mut options = self.resources.options();
         for (name, value) in &self.set {
             options.set(name, value)?;
         }
@@ -331,7 +329,7 @@ impl Fuse {
             options.fusion.min_confidence = least;
         }
         options.check()?;
-        Ok(options.fusion)
+        Ok(options)
     }
 
     /// The file of the cloud.
@@ -349,7 +347,14 @@ Examples:
   skep info sigma_color             explanation of one option
   skep help reconstruct             input and output files, and remedies of failures
 
-Exit status: 0 done, 1 failed, 2 wrong arguments, 130 interrupted (Ctrl-C).";
+Lines of --progress json: phase (read, search, check, fusion), done (0 to 1), seconds_left (null at first), view
+(the one that is worked on, from 0; several may be at the same time), views (their number), cycle (from 0) and
+downscale of its scale, both null except in search and check; or message. Warnings and errors are lines that
+begin with `warning: ` and `error: `.
+
+Exit status: 0 done, 1 failed, 2 wrong arguments; interrupted: 130 by Ctrl-C (SIGINT), 143 by SIGTERM,
+129 by SIGHUP. A second signal ends the program at once. Signals that are ignored when it starts, as
+`nohup` has it, stay ignored.";
 
 const RECONSTRUCT_HELP: &str = "\
 The scene:

@@ -12,9 +12,11 @@ mod report;
 mod stopwatch;
 mod streams;
 mod tasks;
+mod time_left;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
+use interrupt::Interrupt;
 use skep::Error;
 use std::process::ExitCode;
 
@@ -22,24 +24,24 @@ use std::process::ExitCode;
 const FAILED: u8 = 1;
 /// Exit status: wrong arguments; the same as clap's.
 const USAGE: u8 = 2;
-/// Exit status: stopped by the user, as shells report it: 128 + SIGINT.
-const INTERRUPTED: u8 = 130;
 
 fn main() -> ExitCode {
-    let result = match Arguments::parse().command {
-        Command::Reconstruct(arguments) => reconstruct::run(&arguments),
-        Command::Plan(arguments) => tasks::plan(&arguments),
-        Command::Search(arguments) => tasks::search(&arguments),
-        Command::Check(arguments) => tasks::check(&arguments),
-        Command::Next(arguments) => tasks::next(&arguments),
-        Command::Finish(arguments) => tasks::finish(&arguments),
-        Command::Fuse(arguments) => fuse::run(&arguments),
+    let command = Arguments::parse().command;
+    let interrupt = Interrupt::watch();
+    let result = match command {
+        Command::Reconstruct(arguments) => reconstruct::run(&arguments, &interrupt),
+        Command::Plan(arguments) => tasks::plan(&arguments, &interrupt),
+        Command::Search(arguments) => tasks::search(&arguments, &interrupt),
+        Command::Check(arguments) => tasks::check(&arguments, &interrupt),
+        Command::Next(arguments) => tasks::next(&arguments, &interrupt),
+        Command::Finish(arguments) => tasks::finish(&arguments, &interrupt),
+        Command::Fuse(arguments) => fuse::run(&arguments, &interrupt),
         Command::Info(arguments) => info::run(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(Failure::Usage(error)) => fail(&error, USAGE),
-        Err(Failure::Run(Error::Cancelled)) => ExitCode::from(INTERRUPTED),
+        Err(Failure::Run(Error::Cancelled)) => ExitCode::from(interrupt.status()),
         Err(Failure::Run(error)) => fail(&error, FAILED),
     }
 }

@@ -20,12 +20,11 @@ const THIN_CLOUD: f64 = 0.01;
 const LARGE_SHARE: f64 = 10.0;
 
 /// Runs the command.
-pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
+pub fn run(arguments: &Reconstruct, interrupt: &Interrupt) -> std::result::Result<(), Failure> {
     let run = &arguments.run;
     let stopwatch = Mutex::new(Stopwatch::start());
-    let display = Display::new(run.quiet);
-    let interrupt = Interrupt::watch();
-    let job = plan(run, display, &interrupt)?;
+    let display = Display::new(&run.messages);
+    let job = plan(run, display, interrupt)?;
     if let Some(folder) = &arguments.dump {
         require_writable(folder)?;
     }
@@ -39,7 +38,7 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
     {
         return Err(Error::file(report, format!("cannot be replaced: {error}")).into());
     }
-    let result = with_progress(&job, arguments, display, &stopwatch, &interrupt).inspect_err(|error| {
+    let result = with_progress(&job, arguments, display, &stopwatch, interrupt).inspect_err(|error| {
         if *error == Error::Cancelled {
             streams::notice("interrupted: what is done is kept, and the same command goes on from there");
         }
@@ -48,7 +47,7 @@ pub fn run(arguments: &Reconstruct) -> std::result::Result<(), Failure> {
 
     let mut stopwatch = stopwatch.into_inner().unwrap_or_else(PoisonError::into_inner);
     stopwatch.enter(Stage::Writing);
-    conclude(&job, &result, Some(stopwatch.times()), run.quiet)
+    conclude(&job, &result, Some(stopwatch.times()), run.messages.quiet)
 }
 
 /// Writes the report of a complete run, and says what the run made. `times` are those of the whole run.
@@ -61,8 +60,8 @@ pub fn conclude(
     let mut report = Report::new(job, result);
     let scene = job.scene();
     let ranges: Vec<DepthRange> = (0..scene.views().len()).map(|view| scene.depth_range(view)).collect();
-    let empty = (report.totals.points == 0).then(|| empty_cloud(&report.totals, &ranges, job.options()));
-    report.warnings.extend(empty.clone());
+    let warning = few_points_warning(&report.totals, &ranges, job.options());
+    report.warnings.extend(warning.clone());
     if let Some(times) = times {
         report.set_times(times);
     }
@@ -71,7 +70,7 @@ pub fn conclude(
     if !report_path(output).is_file() {
         report.write(&report_path(output))?;
     }
-    empty.iter().for_each(|warning| streams::warning(warning));
+    warning.iter().for_each(|warning| streams::warning(warning));
     if !quiet {
         summary(output, scene, &ranges, &report.totals).iter().for_each(|line| streams::result(line));
     }
@@ -180,15 +179,19 @@ fn summary(output: &Path, scene: &Scene, ranges: &[DepthRange], totals: &Totals)
     lines
 }
 
+/// `empty` or `thin` for a cloud of few points, of maps with so many pixels.
+pub fn few_points(points: u64, pixels: u64) -> Option<&'static str> {
+    match points {
+        0 => Some("empty"),
+        points if (points as f64) < THIN_CLOUD * pixels as f64 => Some("thin"),
+        _ => None,
+    }
+}
+
 /// Why the cloud is empty or thin: the number of pixels of each status with the remedy, and the depth range.
 /// Nothing for other clouds.
 fn reasons(totals: &Totals, ranges: &[DepthRange]) -> Vec<String> {
-    let unmasked = totals.pixels - totals.status_counts[PixelStatus::Masked.name()];
-    let cloud = match totals.points {
-        0 => "empty",
-        points if (points as f64) < THIN_CLOUD * unmasked as f64 => "thin",
-        _ => return Vec::new(),
-    };
+    let Some(cloud) = few_points(totals.points as u64, unmasked(totals)) else { return Vec::new() };
     let mut lines = vec![format!("the cloud is {cloud}; the status of the pixels:")];
     for status in PixelStatus::ALL.into_iter().filter(|status| totals.status_counts[status.name()] > 0) {
         let (name, share) = (status.name(), share(totals, status));
@@ -198,8 +201,14 @@ fn reasons(totals: &Totals, ranges: &[DepthRange]) -> Vec<String> {
     lines
 }
 
-/// One sentence on an empty cloud, with the most frequent statuses of the pixels and the remedy.
-fn empty_cloud(totals: &Totals, ranges: &[DepthRange], options: &Options) -> String {
+fn unmasked(totals: &Totals) -> u64 {
+    totals.pixels - totals.status_counts[PixelStatus::Masked.name()]
+}
+
+/// One sentence on an empty or thin cloud, with the most frequent statuses of the pixels and the remedies;
+/// nothing for other clouds.
+fn few_points_warning(totals: &Totals, ranges: &[DepthRange], options: &Options) -> Option<String> {
+    let cloud = few_points(totals.points as u64, unmasked(totals))?;
     let mut statuses = PixelStatus::ALL;
     statuses.sort_by_key(|status| std::cmp::Reverse(totals.status_counts[status.name()]));
     let large = statuses.into_iter().filter(|&status| share(totals, status) > LARGE_SHARE);
@@ -208,16 +217,28 @@ fn empty_cloud(totals: &Totals, ranges: &[DepthRange], options: &Options) -> Str
         format!("{share:.1} % of the pixels are {name} ({})", help(status))
     });
     let reasons: Vec<String> = large.collect();
-    let mut text = format!("the cloud is empty: {}; {}", reasons.join(", "), searched(ranges));
-    let others = ranges.len() - 1;
-    if others < options.check.min_consistent_views as usize {
+    let mut text = format!("the cloud is {cloud}: {}; {}", reasons.join(", "), searched(ranges));
+    let (others, wanted) = (ranges.len() - 1, options.check.min_consistent_views as usize);
+    if others < wanted {
         text += &format!(
-            "; {} views cannot confirm a depth in {} other ones: --set check.min_consistent_views={others}",
+            "; {} views cannot confirm a depth in {wanted} other ones: --set \
+             check.min_consistent_views={others}",
             ranges.len(),
-            options.check.min_consistent_views
         );
     }
-    text
+    let agreeing = options.fusion.min_agreeing_views as usize;
+    if agreeing > 1 && (others < agreeing || share(totals, PixelStatus::Validated) > LARGE_SHARE) {
+        let fewer = others.min(agreeing - 1);
+        text += &format!(
+            "; a point needs {agreeing} views that agree with its pixel: --set \
+             fusion.min_agreeing_views={fewer}"
+        );
+    }
+    if options.fusion.min_confidence > 0.0 {
+        let confidence = options.fusion.min_confidence;
+        text += &format!("; pixels below fusion.min_confidence={confidence} are left out");
+    }
+    Some(text)
 }
 
 /// What a status says about the scene, and the remedy.
@@ -294,15 +315,29 @@ mod tests {
     fn the_warning_of_an_empty_cloud_names_the_largest_reasons_and_the_remedy() {
         let options = Options::default();
         let counts = totals(0, [0, 0, 250, 90, 660, 0]);
-        let warning = empty_cloud(&counts, &[RANGES[0], RANGES[1], RANGES[1]], &options);
+        let ranges = [RANGES[0], RANGES[1], RANGES[1], RANGES[0]];
+        let warning = few_points_warning(&counts, &ranges, &options).unwrap();
         let start = "the cloud is empty: 66.0 % of the pixels are inconsistent (other views disagree: ";
         assert!(warning.starts_with(start), "{warning}");
         assert!(warning.contains(", 25.0 % of the pixels are no_texture (too uniform "), "{warning}");
         assert!(!warning.contains("no_sources"), "{warning}");
         assert!(warning.ends_with("; depths of 1.25 to 4.134 were searched"), "{warning}");
 
-        let two_views = empty_cloud(&totals(0, [0, 0, 0, 1000, 0, 0]), &RANGES, &options);
+        let two_views = few_points_warning(&totals(0, [0, 0, 0, 1000, 0, 0]), &RANGES, &options).unwrap();
         assert!(two_views.contains("100.0 % of the pixels are no_sources"), "{two_views}");
-        assert!(two_views.ends_with("--set check.min_consistent_views=1"), "{two_views}");
+        assert!(two_views.contains("--set check.min_consistent_views=1"), "{two_views}");
+        assert!(two_views.ends_with("--set fusion.min_agreeing_views=1"), "{two_views}");
+    }
+
+    #[test]
+    fn a_thin_cloud_of_validated_pixels_is_a_warning_with_the_option_of_the_fusion() {
+        let mut options = Options::default();
+        options.fusion.min_confidence = 0.9;
+        let counts = totals(5, [900, 0, 100, 0, 0, 0]);
+        let warning = few_points_warning(&counts, &[RANGES[0]; 5], &options).unwrap();
+        assert!(warning.starts_with("the cloud is thin: 90.0 % of the pixels are validated"), "{warning}");
+        assert!(warning.contains("--set fusion.min_agreeing_views=2"), "{warning}");
+        assert!(warning.ends_with("pixels below fusion.min_confidence=0.9 are left out"), "{warning}");
+        assert_eq!(few_points_warning(&totals(10, [900, 0, 100, 0, 0, 0]), &RANGES, &options), None);
     }
 }

@@ -75,12 +75,13 @@ pub struct Stopwatch {
 }
 
 impl Stopwatch {
-    /// Starts with reading. The process's CPU seconds up to now count as reading too.
+    /// Starts with reading. What the process used before does not count: a program that became this one by
+    /// `exec` may have worked for long.
     pub fn start() -> Stopwatch {
         Stopwatch {
             stage: Stage::Reading,
             started: Instant::now(),
-            cpu_at_start: Duration::ZERO,
+            cpu_at_start: cpu_now(),
             times: Times::default(),
         }
     }

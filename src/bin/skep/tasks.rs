@@ -10,9 +10,9 @@ use skep::{Error, Progress};
 use std::ops::Range;
 
 /// `skep plan`: prepares the folder, and prints the tasks or writes them to the files that were asked for.
-pub fn plan(arguments: &Plan) -> Result<(), Failure> {
+pub fn plan(arguments: &Plan, interrupt: &Interrupt) -> Result<(), Failure> {
     let run = &arguments.run;
-    let job = reconstruct::plan(run, Display::new(run.quiet), &Interrupt::watch())?;
+    let job = reconstruct::plan(run, Display::new(&run.messages), interrupt)?;
     let folder = run.output();
     if let Some(file) = &arguments.openjd {
         plan_files::write_openjd(&job, &folder, file)?;
@@ -20,7 +20,7 @@ pub fn plan(arguments: &Plan) -> Result<(), Failure> {
     if let Some(file) = &arguments.slurm {
         plan_files::write_slurm(&job, &folder, file)?;
     }
-    if !run.quiet && arguments.openjd.is_none() && arguments.slurm.is_none() {
+    if !run.messages.quiet && arguments.openjd.is_none() && arguments.slurm.is_none() {
         let lines = plan_files::command_lines(&job, &folder.display().to_string());
         lines.iter().for_each(|line| streams::result(line));
     }
@@ -28,33 +28,35 @@ pub fn plan(arguments: &Plan) -> Result<(), Failure> {
 }
 
 /// `skep search`
-pub fn search(arguments: &Views) -> Result<(), Failure> {
+pub fn search(arguments: &Views, interrupt: &Interrupt) -> Result<(), Failure> {
     let Views { planned, cycle, views } = arguments;
-    of_views(planned, views.as_ref(), |view| Task::Search { cycle: *cycle, view })
+    of_views(planned, views.as_ref(), interrupt, |view| Task::Search { cycle: *cycle, view })
 }
 
 /// `skep check`
-pub fn check(arguments: &Views) -> Result<(), Failure> {
+pub fn check(arguments: &Views, interrupt: &Interrupt) -> Result<(), Failure> {
     let Views { planned, cycle, views } = arguments;
-    of_views(planned, views.as_ref(), |view| Task::Check { cycle: *cycle, view })
+    of_views(planned, views.as_ref(), interrupt, |view| Task::Check { cycle: *cycle, view })
 }
 
 /// `skep finish`
-pub fn finish(arguments: &FinishViews) -> Result<(), Failure> {
-    of_views(&arguments.planned, arguments.views.as_ref(), |view| Task::Finish { view })
+pub fn finish(arguments: &FinishViews, interrupt: &Interrupt) -> Result<(), Failure> {
+    of_views(&arguments.planned, arguments.views.as_ref(), interrupt, |view| Task::Finish { view })
 }
 
 /// `skep next`
-pub fn next(arguments: &NextCycle) -> Result<(), Failure> {
+pub fn next(arguments: &NextCycle, interrupt: &Interrupt) -> Result<(), Failure> {
     let planned = &arguments.planned;
     let job = Job::open(&planned.folder, &planned.resources.options())?;
-    Ok(run(&job, &[Task::Next { cycle: arguments.cycle }], Display::new(planned.quiet))?)
+    let display = Display::new(&planned.messages);
+    Ok(run(&job, &[Task::Next { cycle: arguments.cycle }], display, interrupt)?)
 }
 
 /// Does the tasks of a range of views.
 fn of_views(
     planned: &Planned,
     views: Option<&Range<usize>>,
+    interrupt: &Interrupt,
     task: impl Fn(usize) -> Task,
 ) -> Result<(), Failure> {
     let job = Job::open(&planned.folder, &planned.resources.options())?;
@@ -65,12 +67,11 @@ fn of_views(
         return Err(Failure::Usage(Error::argument("--views", value, format!("views of 0..{count}"))));
     }
     let tasks: Vec<Task> = views.map(task).collect();
-    Ok(run(&job, &tasks, Display::new(planned.quiet))?)
+    Ok(run(&job, &tasks, Display::new(&planned.messages), interrupt)?)
 }
 
 /// Does tasks; displays the progress, and ends early when interrupted.
-pub fn run(job: &Job, tasks: &[Task], display: Display) -> skep::Result<()> {
-    let interrupt = Interrupt::watch();
+pub fn run(job: &Job, tasks: &[Task], display: Display, interrupt: &Interrupt) -> skep::Result<()> {
     let reporter = display.start();
     let progress = |progress: &Progress| {
         reporter.show(progress);

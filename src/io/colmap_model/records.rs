@@ -201,14 +201,13 @@ impl ImageRecord {
             let problem = format!("the image name is {:?}; expected {NAME_INSIDE}", self.name);
             return Err(place.error(problem));
         }
-        Ok(ModelImage {
-            camera: Camera {
-                rotation: DMat3::from_quat(quaternion / length),
-                translation: DVec3::from(self.translation),
-                ..*camera
-            },
-            name: self.name,
-        })
+        let camera = Camera {
+            rotation: DMat3::from_quat(quaternion / length),
+            translation: DVec3::from(self.translation),
+            ..*camera
+        };
+        camera.check(&format!("image {}", self.id)).map_err(|error| place.error(error))?;
+        Ok(ModelImage { camera, name: self.name })
     }
 }
 

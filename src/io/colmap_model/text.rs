@@ -3,7 +3,7 @@
 use super::ColmapModel;
 use super::camera_models::CameraModel;
 use super::records::{CameraRecord, Files, ImageRecord, Layout, Place, PointRecord, Records};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::io::files::{cannot_be_read, write_file};
 use std::io::Write;
 use std::path::Path;
@@ -92,9 +92,32 @@ fn point(mut fields: Fields) -> Result<PointRecord> {
     Ok(PointRecord { line: fields.place.line, id, position, track })
 }
 
+/// Reads a file in UTF-8, with or without the mark that editors on Windows put at its beginning.
 fn read_text(path: &Path) -> Result<String> {
-    std::fs::read_to_string(path).map_err(|error| cannot_be_read(path, error))
+    let bytes = std::fs::read(path).map_err(|error| cannot_be_read(path, error))?;
+    let line_of = |place: usize| bytes[..place].iter().filter(|&&byte| byte == b'\n').count() + 1;
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return Err(Error::line(path, 1, "the text is UTF-16; save it as UTF-8"));
+    }
+    if let Some(place) = bytes.iter().position(|&byte| byte == 0) {
+        let problem = "a byte 0: the text is UTF-16 or damaged; save it as UTF-8";
+        return Err(Error::line(path, line_of(place), problem));
+    }
+    let text = bytes.strip_prefix(&BYTE_ORDER_MARK).unwrap_or(&bytes);
+    match std::str::from_utf8(text) {
+        Ok(text) => Ok(text.to_owned()),
+        Err(error) => {
+            let place = bytes.len() - text.len() + error.valid_up_to();
+            let problem = format!(
+                "the byte {:#04x} is not UTF-8: the text may be Latin-1 or another encoding; save it as UTF-8",
+                bytes[place]
+            );
+            Err(Error::line(path, line_of(place), problem))
+        }
+    }
 }
+
+const BYTE_ORDER_MARK: [u8; 3] = [0xef, 0xbb, 0xbf];
 
 /// Whether a line is neither empty nor a comment.
 fn is_data(line: &str) -> bool {

@@ -49,7 +49,7 @@ class Scene:
         return scene
 
     def write_colmap(self, folder: str | os.PathLike[str]) -> None:
-        """Writes a folder that COLMAP and `read_colmap` read. The views' names must end in .png."""
+        """Writes a folder that COLMAP and `read_colmap` read; photographs are PNG files whatever their names."""
         check(lib.skep_scene_write_colmap(self._handle, path(folder, "folder")))
 
     def add_view(
