@@ -1,5 +1,7 @@
 //! Fused points.
 
+use crate::error::Result;
+
 /// Fused points.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PointCloud {
@@ -11,6 +13,40 @@ pub struct PointCloud {
     pub colors: Vec<[u8; 3]>,
     /// The views each point was fused from, as indices into the scene; first the one it started in.
     pub views: PointViews,
+}
+
+impl PointCloud {
+    /// Appends the points of another cloud.
+    pub(crate) fn append(&mut self, other: &PointCloud) {
+        self.positions.extend_from_slice(&other.positions);
+        self.normals.extend_from_slice(&other.normals);
+        self.colors.extend_from_slice(&other.colors);
+        for point in 0..other.views.len() {
+            self.views.push(other.views.get(point));
+        }
+    }
+}
+
+/// Points that are read in parts, as often as it takes.
+pub(crate) trait CloudSource {
+    /// Number of points.
+    fn len(&self) -> usize;
+
+    /// Calls `body` with the points, some at a time, in the same order each time.
+    ///
+    /// # Errors
+    /// Points that cannot be read; what `body` returns.
+    fn each_part(&self, body: &mut dyn FnMut(&PointCloud) -> Result<()>) -> Result<()>;
+}
+
+impl CloudSource for PointCloud {
+    fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    fn each_part(&self, body: &mut dyn FnMut(&PointCloud) -> Result<()>) -> Result<()> {
+        body(self)
+    }
 }
 
 /// A list of views for each point, in one allocation.

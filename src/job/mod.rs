@@ -8,6 +8,7 @@
 //!
 //! The folder is also the workspace with the results: see [`crate::io::Workspace`].
 
+mod cloud;
 mod estimates;
 mod fingerprint;
 mod folder;
@@ -16,15 +17,16 @@ mod manifest;
 mod maps;
 mod meter;
 mod needs;
+mod outputs;
 mod photograph;
 mod plan;
 mod run;
 mod task;
 
 use crate::error::{Error, Result};
-use crate::fusion::{fuse_input, overlaps};
+use crate::fusion::{CloudSource, overlaps};
 use crate::geometry::DepthRange;
-use crate::io::{CloudWriter, SceneFolder, Workspace, visibility_path};
+use crate::io::{SceneFolder, Workspace};
 use crate::memory::require_memory;
 use crate::options::Options;
 use crate::parallel::{JoinedPool, ProgressFn, useful_threads};
@@ -243,7 +245,7 @@ impl Job {
         // Only now: a process that is killed in between must find what it needs to do the task again.
         match task {
             Task::Next { cycle } => self.estimates.remove_before_check(cycle),
-            Task::Fuse => self.estimates.remove_all(),
+            Task::Fuse => self.remove_temporaries(),
             _ => (),
         }
         Ok(())
@@ -361,13 +363,19 @@ impl Job {
         let checked = self.estimates.checked(&self.stepper, last, last);
         let result = self.stepper.finish_streamed(view, &checked, progress)?;
         let own = &self.scene.views()[view];
-        self.workspace.write_view(&own.name, &own.camera, &result)?;
+        let files = self.options.output.write;
+        self.workspace.write_view_files(&own.name, &own.camera, &result, &files)?;
+        if !files.has_fused_maps() {
+            self.workspace.write_fused_maps(&own.name, &own.camera, &result)?;
+        }
         let summary = ViewSummary {
             status_counts: result.status_counts(),
             counts: result.counts,
             cycles: result.cycles,
         };
-        Ok((Content::Finish(summary), self.workspace.view_files(&own.name)))
+        let mut written = self.workspace.view_files(&own.name, &files);
+        written.extend(outputs::temporary_files(&self.workspace, &own.name, &files));
+        Ok((Content::Finish(summary), written))
     }
 
     fn fuse(&self, progress: ProgressFn) -> Result<(Content, Vec<PathBuf>)> {
@@ -380,11 +388,9 @@ impl Job {
         self.estimates.forget();
         let limit = self.shares.fusion;
         let views = FinishedViews::new(&self.scene, &self.workspace, &self.overlaps, limit);
-        let path = self.workspace.cloud();
-        let mut cloud = CloudWriter::new(&path)?;
-        fuse_input(&views, &self.options.fusion, progress, &mut |points| cloud.add(points))?;
-        let points = cloud.finish()?;
-        let visibility = visibility_path(&path);
-        Ok((Content::Fuse(points), vec![path, visibility]))
+        let memory = self.needs.memory.saturating_sub(self.shares.least.base);
+        let made = cloud::make(views, &self.options, memory, progress)?;
+        let points = made.len();
+        Ok((Content::Fuse(points), made.write(&self.options.output)?))
     }
 }

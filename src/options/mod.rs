@@ -4,6 +4,7 @@
 //! of a user are named constants at the top of the files that use them.
 
 mod groups;
+mod output;
 mod presets;
 mod schedule;
 mod value;
@@ -16,6 +17,7 @@ pub use groups::{
     CheckOptions, CostOptions, FusionOptions, RefineOptions, SearchOptions, ViewSelectionOptions,
     WindowOptions,
 };
+pub use output::{CloudFormat, OutputOptions, ViewFiles};
 pub use schedule::{Scale, ScheduleOptions};
 use schedule::{scales_from_text, scales_to_text};
 #[cfg(feature = "capi")]
@@ -58,6 +60,8 @@ pub struct Options {
     pub refine: RefineOptions,
     /// Fusion into points.
     pub fusion: FusionOptions,
+    /// What a run in a folder writes; nothing else depends on it.
+    pub output: OutputOptions,
 }
 
 /// The name of the best instruction set that the machine supports.
@@ -85,6 +89,21 @@ const SCALES: OptionInfo = OptionInfo {
                   iterations=1+2x1` is half size with 3 food sources a pixel, 5 iterations in the first \
                   cycle and 4 more cycles of 1, then full size.",
     unit: "text",
+    kind: Kind::Text,
+};
+
+const WRITE: OptionInfo = OptionInfo {
+    name: "output.write",
+    explanation: "Files of each view: some of depth, normals, confidence, status, graphs, previews, \
+                  separated by commas; with + or - before each name they are added to those of the default or left out.",
+    unit: "text",
+    kind: Kind::Text,
+};
+
+const CLOUD_FORMAT: OptionInfo = OptionInfo {
+    name: "output.cloud_format",
+    explanation: "Format of the cloud: ply, las or laz.",
+    unit: "name",
     kind: Kind::Text,
 };
 
@@ -120,6 +139,15 @@ const OTHERS: &[Entry] = &[
         get: |options| options.schedule.min_changed_fraction,
         set: |options, value| options.schedule.min_changed_fraction = value,
     },
+    Entry {
+        c_name: c"output.splat",
+        explanation: "Write a scene for Gaussian splatting too, in `splat/`: photographs, cameras, and the \
+                      cloud as the points to start from.",
+        unit: "switch",
+        kind: Kind::Switch,
+        get: |options| f64::from(u8::from(options.output.splat)),
+        set: |options, value| options.output.splat = value != 0.0,
+    },
 ];
 
 fn numbers() -> impl Iterator<Item = &'static Entry> {
@@ -133,6 +161,7 @@ impl Options {
     /// An option out of its range.
     pub fn check(&self) -> Result<()> {
         self.check_scales()?;
+        self.output.cloud_format.check()?;
         for entry in numbers() {
             entry.kind.check(entry.name(), (entry.get)(self))?;
         }
@@ -158,15 +187,17 @@ impl Options {
 
     /// All options, in the order in which they are listed: name, explanation, unit and values of each.
     pub fn infos() -> impl Iterator<Item = OptionInfo> {
-        let [threads, memory, min_changed] = [0, 1, 2].map(|index: usize| OTHERS[index].info());
-        [SEED, threads, memory, SIMD, SCALES, min_changed].into_iter().chain(GROUPED.iter().map(Entry::info))
+        let [threads, memory, min_changed, splat] = [0, 1, 2, 3].map(|index: usize| OTHERS[index].info());
+        let first = [SEED, threads, memory, SIMD, SCALES, min_changed].into_iter();
+        first.chain(GROUPED.iter().map(Entry::info)).chain([WRITE, CLOUD_FORMAT, splat])
     }
 
     /// The groups with a sentence on each, in the order of the options.
     pub fn groups() -> impl Iterator<Item = (&'static str, &'static str)> {
         let schedule = ("schedule", "Schedule: the scales of a run and the cycles on each.");
         let trimmed = |&(name, text): &(&'static str, &'static str)| (name, text.trim_start());
-        std::iter::once(schedule).chain(groups::GROUPS.iter().map(trimmed))
+        let output = ("output", "Output: what a run in a folder writes; it changes no values.");
+        std::iter::once(schedule).chain(groups::GROUPS.iter().map(trimmed)).chain([output])
     }
 
     /// The description of the option of this name.
@@ -197,6 +228,8 @@ impl Options {
             Some(entry) => entry.value(self),
             None if info == SEED => OptionValue::Count(self.seed),
             None if info == SIMD => OptionValue::Text(self.simd.map_or(BEST, SimdLevel::name).to_owned()),
+            None if info == WRITE => OptionValue::Text(self.output.write.to_string()),
+            None if info == CLOUD_FORMAT => OptionValue::Text(self.output.cloud_format.name().to_owned()),
             None => OptionValue::Text(scales_to_text(&self.schedule.scales)),
         })
     }
@@ -245,6 +278,10 @@ impl Options {
                 )));
             }
             self.simd = level;
+        } else if info == WRITE {
+            self.output.write = text.parse()?;
+        } else if info == CLOUD_FORMAT {
+            self.output.cloud_format = CloudFormat::from_name(text)?;
         } else if info.name == MEMORY {
             self.set_number(MEMORY, parse_bytes(text)? as f64)?;
         } else if info == SCALES {
@@ -273,7 +310,13 @@ impl Options {
     #[cfg(feature = "capi")]
     pub(crate) fn c_name(index: usize) -> Option<&'static CStr> {
         let name = Options::infos().nth(index)?.name;
-        let others = [(SEED, c"seed"), (SIMD, c"simd"), (SCALES, c"schedule.scales")];
+        let others = [
+            (SEED, c"seed"),
+            (SIMD, c"simd"),
+            (SCALES, c"schedule.scales"),
+            (WRITE, c"output.write"),
+            (CLOUD_FORMAT, c"output.cloud_format"),
+        ];
         let other = others.into_iter().find(|(info, _)| info.name == name).map(|(_, c_name)| c_name);
         other.or_else(|| numbers().find(|entry| entry.name() == name).map(|entry| entry.c_name))
     }

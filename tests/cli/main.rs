@@ -5,6 +5,8 @@ mod dump;
 #[cfg(unix)]
 mod interruption;
 mod layouts;
+#[cfg(unix)]
+mod outputs;
 mod run_folder;
 
 use layouts::{check_cloud, check_maps};
@@ -265,7 +267,7 @@ fn parts_of_the_method_can_be_left_out_quietly() {
 fn the_embedded_scene_end_to_end() {
     let repository = files(&board());
     let scene = copied_board();
-    let output = skep(&["reconstruct", path(&scene)]);
+    let output = skep(&["reconstruct", path(&scene), "--write", "+graphs"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let dense = scene.path().join("dense");
     let report = report(&dense);

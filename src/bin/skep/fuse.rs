@@ -5,9 +5,10 @@ use crate::interrupt::Interrupt;
 use crate::progress::Display;
 use crate::{Failure, reconstruct, streams, tasks};
 use skep::fusion::{FusionView, fuse, overlaps};
-use skep::io::{SceneFolder, Workspace, WorkspaceMaps};
+use skep::io::{ModelImage, SceneFolder, Workspace, WorkspaceMaps, WorkspaceView};
 use skep::job::{self, Job, Task};
 use skep::{Error, FusionOptions, PointCloud, Progress};
+use std::path::Path;
 
 /// Runs the command.
 pub fn run(arguments: &Fuse) -> Result<(), Failure> {
@@ -15,6 +16,7 @@ pub fn run(arguments: &Fuse) -> Result<(), Failure> {
     if arguments.is_task() {
         return task(arguments, display);
     }
+    let (options, output) = arguments.options().map_err(Failure::Usage)?;
     display.print(&format!("reading {}", arguments.workspace.display()));
     let workspace = Workspace::new(&arguments.workspace);
     let scene = match &arguments.scene {
@@ -35,23 +37,38 @@ pub fn run(arguments: &Fuse) -> Result<(), Failure> {
     }
 
     let interrupt = Interrupt::watch();
-    let output = arguments.output();
-    let options = arguments.options().map_err(Failure::Usage)?;
     let threads = arguments.resources.options().threads;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|error| Error::argument("--threads", threads, error.to_string()))?;
-    let cloud = pool.install(|| fuse_maps(&maps, &options, display, &interrupt)).inspect_err(|error| {
-        if *error == Error::Cancelled {
-            streams::notice(&format!("interrupted: {} was not written", output.display()));
-        }
-    })?;
+    let cloud =
+        pool.install(|| fuse_maps(&maps, &options.fusion, display, &interrupt)).inspect_err(|error| {
+            if *error == Error::Cancelled {
+                streams::notice(&format!("interrupted: {} was not written", output.display()));
+            }
+        })?;
     Workspace::write_cloud(&output, &cloud)?;
+    if options.output.splat {
+        write_splat(&output, &scene, &maps, &cloud)?;
+    }
 
     if !arguments.quiet {
         summary(&maps, &cloud).iter().for_each(|line| streams::result(line));
         streams::result(&format!("{} points in {}", cloud.positions.len(), output.display()));
     }
     Ok(())
+}
+
+/// Writes a scene for Gaussian splatting beside the cloud.
+fn write_splat(
+    output: &Path,
+    scene: &SceneFolder,
+    maps: &WorkspaceMaps,
+    cloud: &PointCloud,
+) -> skep::Result<()> {
+    let image = |view: &WorkspaceView| ModelImage { name: view.name.clone(), camera: view.camera };
+    let images: Vec<ModelImage> = maps.views.iter().map(image).collect();
+    let folder = output.parent().unwrap_or(Path::new("")).join("splat");
+    Workspace::write_splat(&folder, &images, &scene.images, cloud)
 }
 
 /// Does the last task of a run.
@@ -94,8 +111,7 @@ fn fuse_maps(
 /// What was fused and, when the cloud is empty, the likely reason.
 fn summary(maps: &WorkspaceMaps, cloud: &PointCloud) -> Vec<String> {
     let pixels: usize = maps.views.iter().map(|view| view.maps.depth.len()).sum();
-    let depths =
-        |view: &skep::io::WorkspaceView| view.maps.depth.iter().filter(|&&depth| depth > 0.0).count();
+    let depths = |view: &WorkspaceView| view.maps.depth.iter().filter(|&&depth| depth > 0.0).count();
     let estimated: usize = maps.views.iter().map(depths).sum();
     let kind = maps.kind.colmap_name();
     let mut lines = vec![format!("{estimated} depths of {pixels} pixels in the {kind} maps")];

@@ -1,10 +1,12 @@
 //! The command line.
 
 mod arguments;
+mod convert;
 mod dump;
 mod fuse;
 mod info;
 mod interrupt;
+mod output_arguments;
 mod plan_files;
 mod progress;
 mod reconstruct;
@@ -34,6 +36,7 @@ fn main() -> ExitCode {
         Command::Next(arguments) => tasks::next(&arguments),
         Command::Finish(arguments) => tasks::finish(&arguments),
         Command::Fuse(arguments) => fuse::run(&arguments),
+        Command::Convert(arguments) => convert::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
     };
     match result {
