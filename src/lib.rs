@@ -211,8 +211,9 @@ pub use fusion::{PointCloud, PointViews};
 pub use geometry::DepthRange;
 pub use memory::{available_memory, format_bytes, parse_bytes};
 pub use options::{
-    CheckOptions, CostOptions, FusionOptions, InputOptions, Kind, OptionInfo, OptionValue, Options,
-    RefineOptions, Scale, ScheduleOptions, SearchOptions, ViewSelectionOptions, WindowOptions,
+    CheckOptions, CloudFormat, CostOptions, FusionOptions, InputOptions, Kind, OptionInfo, OptionValue,
+    Options, OutputOptions, RefineOptions, Scale, ScheduleOptions, SearchOptions, ViewFiles,
+    ViewSelectionOptions, WindowOptions,
 };
 pub use parallel::{Phase, Progress, ProgressFn, ignore_progress};
 pub use pipeline::{

@@ -18,6 +18,8 @@ const OPTIONS: FusionOptions = FusionOptions {
     min_agreeing_fraction: 0.0,
     min_confidence: 0.0,
     compensate_exposure: false,
+    voxel_size: 0.0,
+    max_points: 0,
 };
 
 /// For every view all the others.

@@ -112,8 +112,9 @@ pub unsafe extern "C" fn skep_result_write_workspace(
     })
 }
 
-/// Writes a cloud as binary PLY (x, y, z as floats, normals, colors), and the views of each point beside it
-/// in FILE.vis, as COLMAP does.
+/// Writes a cloud as binary PLY (x, y, z, normals, colors), and the views of each point beside it in
+/// FILE.vis, as COLMAP does. x, y and z are float, or double where floats cannot hold the distances of the points, as
+/// with geographic coordinates.
 ///
 /// @param cloud  The cloud.
 /// @param file   Path of the file.
@@ -123,7 +124,8 @@ pub unsafe extern "C" fn skep_cloud_write_ply(cloud: *const skep_cloud, file: *c
     guard(|| {
         // SAFETY: as the header demands of the caller.
         let (cloud, file) = unsafe { (get(cloud, "cloud")?, path(file, "file")?) };
-        Ok(Workspace::write_cloud(file, &cloud.points)?)
+        io::write_ply(file, &cloud.points)?;
+        Ok(io::write_visibility(&io::visibility_path(file), &cloud.points.views)?)
     })
 }
 

@@ -23,7 +23,8 @@ use std::ffi::{c_char, c_void};
 ///                            SKEP_TASK_FUSE
 ///
 /// A task that is done, or of a cycle that the run skips, succeeds at once. The results are files in the
-/// folder, which is a COLMAP workspace: stereo/, preview/, fused.ply.
+/// folder, which is a COLMAP workspace: stereo/, preview/, fused.ply. The options of the group "output" choose
+/// among them.
 pub struct skep_job {
     job: Job,
 }

@@ -1,5 +1,6 @@
 //! Fused points.
 
+use crate::error::Result;
 use glam::DVec3;
 
 /// Fused points.
@@ -28,6 +29,45 @@ impl PointCloud {
             }
         }
         kept
+    }
+
+    /// The points with other numbers of their views.
+    #[cfg(feature = "io")]
+    pub(crate) fn renumbered(mut self, numbers: &[u32]) -> PointCloud {
+        self.views.views.iter_mut().for_each(|view| *view = numbers[*view as usize]);
+        self
+    }
+
+    /// Appends the points of another cloud.
+    pub(crate) fn append(&mut self, other: &PointCloud) {
+        self.positions.extend_from_slice(&other.positions);
+        self.normals.extend_from_slice(&other.normals);
+        self.colors.extend_from_slice(&other.colors);
+        for point in 0..other.views.len() {
+            self.views.push(other.views.get(point));
+        }
+    }
+}
+
+/// Points that are read in parts, as often as it takes.
+pub(crate) trait CloudSource {
+    /// Number of points.
+    fn len(&self) -> usize;
+
+    /// Calls `body` with the points, some at a time, in the same order each time.
+    ///
+    /// # Errors
+    /// Points that cannot be read; what `body` returns.
+    fn each_part(&self, body: &mut dyn FnMut(&PointCloud) -> Result<()>) -> Result<()>;
+}
+
+impl CloudSource for PointCloud {
+    fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    fn each_part(&self, body: &mut dyn FnMut(&PointCloud) -> Result<()>) -> Result<()> {
+        body(self)
     }
 }
 

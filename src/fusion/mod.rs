@@ -11,6 +11,7 @@ mod exposure;
 mod overlap;
 mod source;
 mod streamed;
+mod thinning;
 
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
@@ -19,6 +20,7 @@ use crate::options::FusionOptions;
 use crate::parallel::{Phase, Progress, ProgressFn};
 use crate::scene::{Maps, PixelStatus};
 use average::{Member, average};
+pub(crate) use cloud::CloudSource;
 pub use cloud::{PointCloud, PointViews};
 use glam::{DVec2, DVec3};
 pub use overlap::overlaps;
@@ -26,6 +28,8 @@ use rayon::prelude::*;
 use source::{Comparison, Source};
 use std::sync::atomic::{AtomicU64, Ordering};
 pub(crate) use streamed::{LoadedView, StreamedViews, streamed_bytes};
+#[cfg(feature = "io")]
+pub(crate) use thinning::{draw, thin_by_voxels};
 
 /// A view with its maps: the input of [`fuse`].
 #[derive(Debug, Clone, Copy)]
@@ -100,10 +104,10 @@ pub fn fuse(views: &[FusionView], options: &FusionOptions, progress: ProgressFn)
     }
     let mut cloud = PointCloud::default();
     fuse_input(&InMemory(views), options, progress, &mut |points| {
-        append(&mut cloud, points);
+        cloud.append(points);
         Ok(())
     })?;
-    Ok(cloud)
+    thinning::thin(cloud, options)
 }
 
 /// The views of a fusion, of which a few at a time have to be in memory.
@@ -156,8 +160,8 @@ fn with_group(
     input.with_views(&group, body)
 }
 
-/// Fuses like [`fuse`], gives the points to `emit` as they are made, and has only the views that overlap with
-/// one in memory at a time. The options and the views must be valid.
+/// Fuses like [`fuse`] but does not thin the cloud, gives the points to `emit` as they are made, and has only
+/// the views that overlap with one in memory at a time. The options and the views must be valid.
 ///
 /// # Errors
 /// Views that cannot be read; what `emit` returns; [`Error::Cancelled`].
@@ -245,15 +249,6 @@ fn check_view(views: &[FusionView], index: usize) -> Result<()> {
         }
     }
     Ok(())
-}
-
-fn append(cloud: &mut PointCloud, points: &PointCloud) {
-    cloud.positions.extend_from_slice(&points.positions);
-    cloud.normals.extend_from_slice(&points.normals);
-    cloud.colors.extend_from_slice(&points.colors);
-    for point in 0..points.views.len() {
-        cloud.views.push(points.views.get(point));
-    }
 }
 
 /// Depth and unit normal of a pixel, `None` where there is no usable estimate.

@@ -3,6 +3,7 @@
 use super::files::{cannot_be_written, check_file_place};
 use super::workspace::Workspace;
 use crate::error::{Error, Result};
+use crate::options::ViewFiles;
 use std::collections::{HashMap, HashSet};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -40,7 +41,7 @@ impl Workspace {
         let mut files = others;
         for name in names {
             Workspace::check_name(name)?;
-            files.extend(self.view_files(name));
+            files.extend(self.view_files(name, &ViewFiles::ALL));
         }
         files.push(self.cloud());
         for file in &mut files {

@@ -85,6 +85,17 @@ pub fn write_fraction_preview(
     write_png(path, width, height, &bytes, ExtendedColorType::L8)
 }
 
+/// Writes a small number of each pixel, as it is, into an 8-bit gray picture.
+pub(super) fn write_numbers(
+    path: &Path,
+    width: u32,
+    height: u32,
+    number: impl Fn(usize) -> u8,
+) -> Result<()> {
+    let bytes: Vec<u8> = (0..width as usize * height as usize).map(number).collect();
+    write_png(path, width, height, &bytes, ExtendedColorType::L8)
+}
+
 fn write_rgb(path: &Path, width: u32, height: u32, color: impl Fn(usize) -> [u8; 3]) -> Result<()> {
     let bytes: Vec<[u8; 3]> = (0..width as usize * height as usize).map(color).collect();
     write_png(path, width, height, bytes.as_flattened(), ExtendedColorType::Rgb8)

@@ -1,19 +1,14 @@
 //! The dense folder: maps, consistency graphs, previews and the fused cloud, laid out as COLMAP does.
 
-use super::colmap_maps::{
-    Grid, read_depth_map, read_normal_map, write_consistency_graph, write_depth_map, write_normal_map,
-};
-use super::colmap_model::ColmapModel;
+use super::cloud::{self, visibility_path, write_visibility};
+use super::colmap_maps::{Grid, read_depth_map, read_normal_map};
+use super::colmap_model::{ColmapModel, ModelImage};
 use super::files::{NAME_INSIDE, cannot_be_read, copy_file, link_or_copy, stays_inside, write_file};
-use super::ply::{visibility_path, write_ply, write_visibility};
-use super::previews::{
-    write_depth_preview, write_fraction_preview, write_normal_preview, write_views_preview,
-};
 use super::scene_folder::SceneFolder;
 use crate::error::{Error, Result};
 use crate::fusion::PointCloud;
 use crate::geometry::Camera;
-use crate::pipeline::ViewResult;
+use crate::options::CloudFormat;
 use crate::scene::Maps;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -84,6 +79,11 @@ impl Workspace {
         self.map("confidence_maps", name, kind)
     }
 
+    /// `stereo/status_maps/NAME.png`
+    pub fn status_map(&self, name: &str) -> PathBuf {
+        self.folder.join("stereo").join("status_maps").join(format!("{name}.png"))
+    }
+
     /// `preview/NAME.WHAT.png`, `what` being `depth`, `normal`, `views` or `confidence`.
     pub fn preview(&self, name: &str, what: &str) -> PathBuf {
         self.folder.join("preview").join(format!("{name}.{what}.png"))
@@ -91,46 +91,26 @@ impl Workspace {
 
     /// `fused.ply`
     pub fn cloud(&self) -> PathBuf {
-        self.folder.join("fused.ply")
+        self.cloud_as(CloudFormat::Ply)
     }
 
-    fn map(&self, what: &str, name: &str, kind: MapKind) -> PathBuf {
+    /// `fused.FORMAT`
+    pub fn cloud_as(&self, format: CloudFormat) -> PathBuf {
+        self.folder.join(format!("fused.{}", format.name()))
+    }
+
+    /// `splat/`
+    pub fn splat(&self) -> PathBuf {
+        self.folder.join("splat")
+    }
+
+    pub(super) fn map(&self, what: &str, name: &str, kind: MapKind) -> PathBuf {
         self.folder.join("stereo").join(what).join(format!("{name}.{}.bin", kind.colmap_name()))
-    }
-
-    /// The files that [`Workspace::write_view`] writes for a view.
-    pub fn view_files(&self, name: &str) -> Vec<PathBuf> {
-        let kinds = [MapKind::Raw, MapKind::Validated];
-        let maps = ["depth_maps", "normal_maps", "confidence_maps", "consistency_graphs"];
-        let maps = kinds.into_iter().flat_map(|kind| maps.map(|what| self.map(what, name, kind)));
-        maps.chain(["depth", "normal", "views", "confidence"].map(|what| self.preview(name, what))).collect()
     }
 
     /// Returns an error for a view's name whose files would be outside the folder.
     pub fn check_name(name: &str) -> Result<()> {
         if stays_inside(name) { Ok(()) } else { Err(Error::argument("view's name", name, NAME_INSIDE)) }
-    }
-
-    /// Writes all files of one view: depth, normal and confidence map and consistency graph of the raw
-    /// estimate (photometric) and of the validated pixels (geometric), and previews of the latter. A
-    /// confidence map has the layout of a depth map.
-    ///
-    /// # Errors
-    /// A name that leads outside the folder; a file that cannot be written.
-    pub fn write_view(&self, name: &str, camera: &Camera, result: &ViewResult) -> Result<()> {
-        Workspace::check_name(name)?;
-        let validated = result.validated();
-        self.write_maps(name, MapKind::Raw, camera, &result.raw, result)?;
-        self.write_maps(name, MapKind::Validated, camera, &validated, result)?;
-        let (width, height) = (camera.width, camera.height);
-        write_fraction_preview(&self.preview(name, "confidence"), width, height, |pixel| {
-            if validated.depth[pixel] > 0.0 { result.confidence[pixel] } else { 0.0 }
-        })?;
-        write_depth_preview(&self.preview(name, "depth"), width, height, &validated.depth)?;
-        write_normal_preview(&self.preview(name, "normal"), width, height, &validated.normal)?;
-        write_views_preview(&self.preview(name, "views"), width, height, result.sources.len(), |pixel| {
-            if validated.depth[pixel] > 0.0 { result.view_sets.count(pixel) } else { 0 }
-        })
     }
 
     /// Writes `stereo/patch-match.cfg` and `stereo/fusion.cfg`, the lists of images that COLMAP requires.
@@ -167,33 +147,28 @@ impl Workspace {
         Ok(())
     }
 
-    fn write_maps(
-        &self,
-        name: &str,
-        kind: MapKind,
-        camera: &Camera,
-        maps: &Maps,
-        result: &ViewResult,
-    ) -> Result<()> {
-        let (width, height) = (camera.width, camera.height);
-        write_depth_map(&self.depth_map(name, kind), width, height, &maps.depth)?;
-        write_normal_map(&self.normal_map(name, kind), width, height, &maps.normal)?;
-        let is_estimated = maps.depth.iter().map(|&depth| depth > 0.0);
-        let confidence: Vec<f32> = (result.confidence.iter().zip(is_estimated))
-            .map(|(&confidence, is_estimated)| if is_estimated { confidence } else { 0.0 })
-            .collect();
-        write_depth_map(&self.confidence_map(name, kind), width, height, &confidence)?;
-        write_consistency_graph(&self.consistency_graph(name, kind), width, height, |pixel| {
-            let estimated = maps.depth[pixel] > 0.0;
-            let sources = result.view_sets.iter(pixel).filter(move |_| estimated);
-            sources.map(|source| result.sources[source])
-        })
+    /// Writes `fused.ply` and `fused.ply.vis`, or another file of a cloud, in the format of its ending, and
+    /// its `.vis` beside it.
+    ///
+    /// # Errors
+    /// An ending of no known format; a file that cannot be written.
+    pub fn write_cloud(path: &Path, cloud: &PointCloud) -> Result<()> {
+        cloud::write_points(path, CloudFormat::of_file(path)?, cloud)?;
+        write_visibility(&visibility_path(path), &cloud.views)
     }
 
-    /// Writes `fused.ply` and `fused.ply.vis`, or another PLY file and its `.vis` beside it.
-    pub fn write_cloud(path: &Path, cloud: &PointCloud) -> Result<()> {
-        write_ply(path, cloud)?;
-        write_visibility(&visibility_path(path), &cloud.views)
+    /// Writes a scene for programs for Gaussian splatting into a folder: `images/`, linked, and `sparse/0/` with
+    /// a model and `points3D.ply`, both with the points of the cloud. `photographs` is the folder of the images.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write_splat(
+        folder: &Path,
+        images: &[ModelImage],
+        photographs: &Path,
+        cloud: &PointCloud,
+    ) -> Result<()> {
+        cloud::write_splat(folder, images, photographs, cloud).map(drop)
     }
 
     /// Reads depth and normal map of one view.

@@ -53,6 +53,13 @@ pub struct WorkspaceMaps {
     scene: SceneFolder,
 }
 
+impl WorkspaceMaps {
+    /// The folder of the photographs.
+    pub(crate) fn photographs(&self) -> &std::path::Path {
+        &self.scene.images
+    }
+}
+
 impl Workspace {
     /// Finds the maps of all views of the scene: the geometric maps when any view has one, else the
     /// photometric ones, never a mixture. Reads the model only.

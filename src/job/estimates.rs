@@ -269,7 +269,7 @@ impl Estimates {
         let found = ReadEstimate::read(stepper, length, |buffer| file.read(buffer));
         let found = found.map_err(|error| match error {
             Error::File { .. } => error,
-            other => Error::file(&file.path, other),
+            other => Error::file(&file.path, format!("damaged: not what the run wrote ({other})")),
         })?;
         file.finish()?;
         Ok(found)

@@ -1,22 +1,23 @@
 //! The fusion of a run's finished views, and of the maps in any workspace.
 
 use super::Job;
+use super::cloud::{self, CloudScene, RunCloud, cloud_files};
 use super::needs::{self, BASE};
 use crate::error::{Error, Result};
-use crate::fusion::{LoadedView, StreamedViews, fuse_input, overlaps, streamed_bytes};
-use crate::io::{CloudWriter, WorkspaceMaps, check_file_place, visibility_path};
+use crate::fusion::{CloudSource, LoadedView, PointCloud, StreamedViews, overlaps, streamed_bytes};
+use crate::io::{ModelImage, WorkspaceMaps, WorkspaceView, check_file_place};
 use crate::memory::{format_bytes, require_memory};
 use crate::options::Options;
 use crate::parallel::{JoinedPool, ProgressFn, useful_threads};
 use crate::scene::SparsePoint;
-use crate::scene::is_inside;
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 impl Job {
-    /// Fuses the finished views into the cloud of the workspace; returns the number of points.
-    pub(super) fn fuse_finished(&self, path: &Path, progress: ProgressFn) -> Result<usize> {
+    /// Fuses the finished views into the cloud of the workspace; returns it and its file.
+    pub(super) fn fuse_finished<'a>(&self, progress: ProgressFn<'a>) -> Result<(RunCloud<'a>, PathBuf)> {
+        let path = self.workspace.cloud_as(self.options.output.cloud_format);
         let load = |index: usize| {
             let view = &self.scene.views()[index];
             let (maps, confidence) = self.workspace.read_finished(&view.name, &view.camera)?;
@@ -24,13 +25,9 @@ impl Job {
         };
         let cameras = self.scene.views().iter().map(|view| &view.camera).collect();
         let views = StreamedViews::new(cameras, &self.overlaps, &load, self.shares.fusion);
-        let mut cloud = CloudWriter::new(path)?;
-        let bounds = self.options.input.bounds()?;
-        fuse_input(&views, &self.options.fusion, progress, &mut |points| match bounds {
-            Some(bounds) => cloud.add(&points.filtered(|position| is_inside(bounds, position))),
-            None => cloud.add(points),
-        })?;
-        cloud.finish()
+        let memory = self.needs.memory.saturating_sub(self.shares.least.base);
+        let made = cloud::make(views, &self.options, (&path, memory), &mut |points| points, progress)?;
+        Ok((made, path))
     }
 }
 
@@ -47,8 +44,9 @@ pub struct FusedWorkspace {
     pub depths: u64,
 }
 
-/// Fuses the maps of a workspace, on a thread pool of its own, and writes a PLY file and the views of its
-/// points, `PATH.vis`, beside it. Of the maps and photographs only those of a view and of the views that
+/// Fuses the maps of a workspace, on a thread pool of its own, and writes a file in the format of the option
+/// `output.cloud_format`, the views of its points, `PATH.vis`, beside it, and with `output.splat` the folder
+/// `splat`. Of the maps and photographs only those of a view and of the views that
 /// overlap with it are in memory, and as many others as the option `memory` allows; of the other options the
 /// fusion's and `threads` count.
 ///
@@ -104,16 +102,23 @@ fn fuse_on_pool(
     let pixels = cameras.iter().map(|camera| camera.pixels() as u64).sum();
     let views = StreamedViews::new(cameras, &overlaps, &load, (memory - least) as usize);
     let numbers: Vec<u32> = used.iter().map(|&view| view as u32).collect();
-    let mut cloud = CloudWriter::new(path)?;
     let mut points_without_color = 0;
-    fuse_input(&views, &options.fusion, progress, &mut |points| {
+    let mut change = |points: PointCloud| {
         let is_gray = |&point: &usize| {
             points.views.get(point).iter().all(|&view| !maps.views[used[view as usize]].has_photograph)
         };
         points_without_color += (0..points.views.len()).filter(is_gray).count() as u64;
-        cloud.add_renumbered(points, &numbers)
-    })?;
-    let points = cloud.finish()? as u64;
+        points.renumbered(&numbers)
+    };
+    let made = cloud::make(views, options, (path, memory - BASE), &mut change, progress)?;
+    let image = |view: &WorkspaceView| ModelImage { name: view.name.clone(), camera: view.camera };
+    let scene = CloudScene {
+        images: maps.views.iter().map(image).collect(),
+        photographs: maps.photographs().to_owned(),
+        splat: path.parent().unwrap_or(Path::new("")).join("splat"),
+    };
+    made.write(path, &options.output, &scene)?;
+    let points = made.len() as u64;
     Ok(FusedWorkspace { points, points_without_color, pixels, depths: depths.into_inner() })
 }
 
@@ -126,9 +131,4 @@ fn points_of(maps: &WorkspaceMaps, used: &[usize]) -> Vec<SparsePoint> {
         views: point.views.iter().filter_map(|&view| places[view as usize]).collect(),
     };
     maps.points.iter().map(renumbered).collect()
-}
-
-/// The PLY file of a cloud and that of the views of its points.
-pub(super) fn cloud_files(path: &Path) -> Vec<PathBuf> {
-    vec![path.to_owned(), visibility_path(path)]
 }

@@ -13,6 +13,9 @@ use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
 /// The options that do not change the result.
 const WITHOUT_EFFECT: [&str; 3] = ["threads", "memory", "simd"];
+/// The options on which only the cloud depends, but for the group [`FUSION`].
+const OF_CLOUD: [&str; 2] = ["output.cloud_format", "output.splat"];
+const FUSION: &str = "fusion.";
 
 /// What a run is made from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -70,9 +73,11 @@ impl Manifest {
         }
     }
 
-    /// The name of the run in its files.
+    /// The name of the run in its files. Options on which only the cloud depends do not change it.
     pub(super) fn run(&self) -> u64 {
-        xxh3_64(&serde_json::to_vec(self).unwrap_or_default())
+        let mut of_maps = self.clone();
+        of_maps.options.retain(|name, _| !(OF_CLOUD.contains(&name.as_str()) || name.starts_with(FUSION)));
+        xxh3_64(&serde_json::to_vec(&of_maps).unwrap_or_default())
     }
 
     /// The options of the run; those without effect on the result keep these values.
@@ -206,6 +211,22 @@ mod tests {
         assert_eq!((again.run(), again.differences(&manifest())), (manifest().run(), Vec::<String>::new()));
         let read = again.options(&options).unwrap();
         assert_eq!(read, options);
+    }
+
+    #[test]
+    fn options_of_the_cloud_alone_do_not_make_another_run() {
+        let mut options = Options::default();
+        options.set("fusion.voxel_size", "0.5").unwrap();
+        options.set("output.splat", "true").unwrap();
+        let changed = Manifest::new(&ColmapModel::default(), manifest().photographs, None, &options);
+        assert_eq!(changed.run(), manifest().run());
+        assert_eq!(
+            changed.differences(&manifest()),
+            ["option fusion.voxel_size (0 to 0.5)", "option output.splat (false to true)"]
+        );
+        options.set("output.write", "+graphs").unwrap();
+        let files = Manifest::new(&ColmapModel::default(), manifest().photographs, None, &options);
+        assert_ne!(files.run(), manifest().run());
     }
 
     #[test]

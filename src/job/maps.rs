@@ -2,9 +2,11 @@
 
 use super::folder::RunFolder;
 use super::manifest::Manifest;
+use super::outputs;
 use super::task::{Record, Task};
 use crate::error::{Error, Result};
-use crate::io::{ColmapModel, ModelImage, SceneFolder};
+use crate::io::{ColmapModel, ModelImage, SceneFolder, Workspace};
+use crate::options::Options;
 use std::path::Path;
 
 /// What of the maps in a folder does not belong to a scene: nothing if no run made them. For a run, files that
@@ -22,11 +24,14 @@ pub fn check_maps(folder: &Path, scene: &SceneFolder) -> Result<Vec<String>> {
         return Err(Error::file(&scene.sparse, problem));
     }
     let run = manifest.run();
+    let (workspace, files) =
+        (Workspace::new(folder.root()), manifest.options(&Options::default())?.output.write);
     let damaged = |(view, image): (usize, &ModelImage)| {
         let Some(record) = Record::read(&folder, run, Task::Finish { view }) else {
             return Some(format!("{} is not finished: its maps may be of another run", image.name));
         };
-        record.verify(&folder).err().map(|error| error.to_string())
+        let gone = outputs::temporary_files(&workspace, &image.name, &files);
+        record.verify(&folder, &gone).err().map(|error| error.to_string())
     };
     Ok(model.images.iter().enumerate().filter_map(damaged).collect())
 }

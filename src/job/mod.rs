@@ -8,6 +8,7 @@
 //!
 //! The folder is also the workspace with the results: see [`crate::io::Workspace`].
 
+mod cloud;
 mod estimates;
 mod folder;
 mod fuse;
@@ -15,24 +16,25 @@ mod manifest;
 mod maps;
 mod meter;
 mod needs;
+mod outputs;
 mod photograph;
 mod plan;
 mod run;
 mod task;
 
 use crate::error::{Error, Result};
-use crate::fusion::overlaps;
+use crate::fusion::{CloudSource, overlaps};
 use crate::geometry::DepthRange;
 use crate::import::prepare;
-use crate::io::Workspace;
+use crate::io::{ModelImage, Workspace};
 use crate::memory::require_memory;
 use crate::options::Options;
 use crate::parallel::{JoinedPool, ProgressFn, useful_threads};
 use crate::pipeline::{Checked, CheckedEstimates, CycleRecord, Stepper, ViewEstimate, thread_count};
 use crate::scene::Scene;
+use cloud::CloudScene;
 use estimates::Estimates;
 use folder::{Access, Lock, RunFolder};
-use fuse::cloud_files;
 pub use fuse::{FusedWorkspace, fuse_workspace};
 use glam::DVec3;
 use manifest::Manifest;
@@ -248,7 +250,7 @@ impl Job {
         // Only now: a process that is killed in between must find what it needs to do the task again.
         match task {
             Task::Next { cycle } => self.estimates.remove_before_check(cycle),
-            Task::Fuse => self.estimates.remove_all(),
+            Task::Fuse => self.remove_temporaries(),
             _ => (),
         }
         Ok(())
@@ -366,13 +368,19 @@ impl Job {
         let checked = self.estimates.checked(&self.stepper, last, last);
         let result = self.stepper.finish_streamed(view, &checked, progress)?;
         let own = &self.scene.views()[view];
-        self.workspace.write_view(&own.name, &own.camera, &result)?;
+        let files = self.options.output.write;
+        self.workspace.write_view_files(&own.name, &own.camera, &result, &files)?;
+        if !files.has_fused_maps() {
+            self.workspace.write_fused_maps(&own.name, &own.camera, &result)?;
+        }
         let summary = ViewSummary {
             status_counts: result.status_counts(),
             counts: result.counts,
             cycles: result.cycles,
         };
-        Ok((Content::Finish(summary), self.workspace.view_files(&own.name)))
+        let mut written = self.workspace.view_files(&own.name, &files);
+        written.extend(outputs::temporary_files(&self.workspace, &own.name, &files));
+        Ok((Content::Finish(summary), written))
     }
 
     fn fuse(&self, progress: ProgressFn) -> Result<(Content, Vec<PathBuf>)> {
@@ -383,8 +391,14 @@ impl Job {
             }
         }
         self.estimates.forget();
-        let path = self.workspace.cloud();
-        let points = self.fuse_finished(&path, progress)?;
-        Ok((Content::Fuse(points), cloud_files(&path)))
+        let (made, path) = self.fuse_finished(progress)?;
+        let views = self.scene.views().iter();
+        let scene = CloudScene {
+            images: views.map(|view| ModelImage { name: view.name.clone(), camera: view.camera }).collect(),
+            photographs: self.workspace.folder().join("images"),
+            splat: self.workspace.splat(),
+        };
+        let files = made.write(&path, &self.options.output, &scene)?;
+        Ok((Content::Fuse(made.len()), files))
     }
 }

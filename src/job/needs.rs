@@ -4,7 +4,7 @@ use super::estimates::{PLANE_BYTES, SURFACE_BYTES};
 use crate::error::{Error, Result};
 use crate::fusion::streamed_bytes;
 use crate::memory::{available_memory, format_bytes};
-use crate::options::Options;
+use crate::options::{Options, ViewFiles};
 use crate::pipeline::{Stepper, thread_count};
 use crate::scene::{Scene, SparsePoint};
 
@@ -25,9 +25,18 @@ const FINISH_BYTES: u64 = 130;
 const IMAGE_BYTES: u64 = 2;
 /// Bytes of a scene for each pixel of a view while its photograph is decoded.
 const DECODE_BYTES: u64 = 12;
-/// Bytes of a view's maps, previews and points on disk for each pixel; 98 to 112 on photographs, by the size of
-/// the view sets.
-const MAP_BYTES: u64 = 115;
+/// Bytes on disk for each pixel of a view's depth maps, raw and validated; confidence maps take the same,
+/// normal maps three times as much.
+const DEPTH_BYTES: u64 = 8;
+/// The same of consistency graphs, previews and status maps, on photographs.
+const GRAPH_BYTES: u64 = 60;
+const PREVIEW_BYTES: u64 = 5;
+const STATUS_BYTES: u64 = 1;
+/// The same of validated depths, normals and confidences, which the fusion reads.
+const FUSED_BYTES: u64 = 20;
+/// The same of the points, in temporary files and written, and of a scene for Gaussian splatting.
+const CLOUD_BYTES: u64 = 30;
+const SPLAT_BYTES: u64 = 25;
 /// Bytes of a view's checked estimate and its surface for each pixel, which stay until the cloud is written.
 /// Before there are maps the estimates take 86: of the cycle before, searched and checked.
 const ESTIMATE_BYTES: u64 = 30;
@@ -97,6 +106,24 @@ pub(super) fn point_bytes(points: &[SparsePoint]) -> u64 {
     points.iter().map(|point| 48 + 4 * point.views.len() as u64).sum()
 }
 
+/// Bytes on disk for each pixel of a view's files.
+fn view_file_bytes(files: &ViewFiles) -> u64 {
+    let bytes = |is_on: bool, bytes: u64| if is_on { bytes } else { 0 };
+    let maps = bytes(files.depth, DEPTH_BYTES)
+        + bytes(files.normals, 3 * DEPTH_BYTES)
+        + bytes(files.confidence, DEPTH_BYTES);
+    let temporary = bytes(!files.has_fused_maps(), FUSED_BYTES);
+    maps + temporary
+        + bytes(files.graphs, GRAPH_BYTES)
+        + bytes(files.previews, PREVIEW_BYTES)
+        + bytes(files.status, STATUS_BYTES)
+}
+
+/// Bytes on disk for each pixel of the cloud, at most at any time.
+fn cloud_bytes(options: &Options) -> u64 {
+    CLOUD_BYTES + if options.output.splat { SPLAT_BYTES } else { 0 }
+}
+
 /// Bytes of the largest task: a view with what it reads of other views.
 fn largest_task(scene: &Scene, stepper: &Stepper) -> u64 {
     let pixels = |view: usize| scene.views()[view].camera.pixels() as u64;
@@ -160,7 +187,7 @@ pub(super) fn needs(
             units as f64 * stepper.sources(view).len() as f64
         })
         .sum();
-    let disk = pixels * (MAP_BYTES + ESTIMATE_BYTES);
+    let disk = pixels * (view_file_bytes(&options.output.write) + ESTIMATE_BYTES + cloud_bytes(options));
     let least_memory = base + task.max(fusion);
     (Needs { least_memory, memory, disk, cpu_seconds: work * SECONDS_PER_UNIT }, shares)
 }

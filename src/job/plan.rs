@@ -3,7 +3,7 @@
 use super::folder::RunFolder;
 use super::manifest::{Manifest, PhotographEntry};
 use super::photograph::FilePhotograph;
-use super::task::Record;
+use super::task::{Record, Task};
 use crate::error::{Error, Result};
 use crate::geometry::DepthRange;
 use crate::image::{Mask, Photograph};
@@ -152,25 +152,50 @@ pub(super) fn prepare(
         }
     };
     remove_temporary_files(folder.root());
-    let goes_on = !fresh && earlier.as_ref() == Some(manifest);
-    if !goes_on {
-        if let Some(earlier) = earlier.filter(|_| !fresh) {
-            let differences = manifest.differences(&earlier);
+    let is_same = earlier.as_ref() == Some(manifest);
+    let goes_on =
+        !fresh && (is_same || earlier.as_ref().is_some_and(|earlier| keeps_maps(folder, earlier, manifest)));
+    if !goes_on || !is_same {
+        let is_notable = !goes_on || Record::read(folder, manifest.run(), Task::Fuse).is_some();
+        if let Some(earlier) = earlier.filter(|_| !fresh && is_notable) {
+            let (what, again) = match goes_on {
+                true => ("cloud", "is made again"),
+                false => ("run", "begins anew"),
+            };
             notices.push(format!(
-                "the run in {} was made from something else and begins anew; changed: {}",
+                "the {what} in {} was made from something else and {again}; changed: {}",
                 folder.root().display(),
-                listed(&differences)
+                listed(&manifest.differences(&earlier))
             ));
         }
-        remove_run(folder)?;
+        if goes_on { remove_cloud(folder, manifest.run())? } else { remove_run(folder)? }
     }
     adopt(folder, source, manifest)?;
     let workspace = Workspace::new(folder.root());
     workspace.write_lists(scene.views().iter().map(|view| view.name.as_str()))?;
-    if !goes_on {
+    if !(goes_on && is_same) {
         manifest.write(&folder.manifest())?;
     }
     Ok(notices)
+}
+
+/// Whether the maps of an earlier run are those of this one, and there: only the cloud differs.
+fn keeps_maps(folder: &RunFolder, earlier: &Manifest, manifest: &Manifest) -> bool {
+    let run = manifest.run();
+    let keeps_all =
+        || manifest.options(&Options::default()).is_ok_and(|options| options.output.write.has_fused_maps());
+    // After the fusion the maps that were not asked for are gone.
+    earlier.run() == run && (Record::read(folder, run, Task::Fuse).is_none() || keeps_all())
+}
+
+/// Removes the cloud and what says that it is complete.
+fn remove_cloud(folder: &RunFolder, run: u64) -> Result<()> {
+    remove(&folder.report())?;
+    if let Some(record) = Record::read(folder, run, Task::Fuse) {
+        remove(&folder.record(Task::Fuse))?;
+        record.remove_files(folder);
+    }
+    Ok(())
 }
 
 /// The first entries of a list, and the number of the others.

@@ -1,6 +1,7 @@
 //! All tasks of a run, in one process.
 
 use super::meter::Meter;
+use super::outputs::temporary_files;
 use super::task::{Content, Record};
 use super::{Job, Task, ViewSummary, plan};
 use crate::error::{Error, Result};
@@ -127,7 +128,7 @@ impl Job {
         let finish = |view| (Task::Finish { view }, FINISH_UNITS * of_view(view));
         self.run_counted((0..self.stepper.views()).map(finish).collect(), &meter)?;
         self.run_counted(vec![(Task::Fuse, FUSE_UNITS * pixels)], &meter)?;
-        self.estimates.remove_all();
+        self.remove_temporaries();
         Ok(())
     }
 
@@ -157,32 +158,52 @@ impl Job {
         let (decided, is_all) = self.decided_cycles();
         let last = decided[decided.len() - 1];
         let views = || 0..self.stepper.views();
-        // A complete run keeps no estimates: only the maps and the cloud are there.
-        let is_complete = self.record(Task::Fuse).is_some();
+        // Once all views are finished no task needs estimates, and after the fusion they are gone.
+        let is_finished = views().all(|view| self.record(Task::Finish { view }).is_some());
+        let is_complete = is_finished && self.record(Task::Fuse).is_some();
         let before = self.cycle_before(last)?;
         let mut inputs: Vec<Task> = Vec::new();
         let mut current: Vec<Task> = views().map(|view| Task::Finish { view }).collect();
         current.push(Task::Fuse);
-        if is_all && !is_complete {
+        if !is_finished && is_all {
             inputs.extend(views().map(|view| Task::Check { cycle: last, view }));
-        } else if !is_complete {
+        } else if !is_finished {
             inputs.extend(
                 before.into_iter().flat_map(|cycle| views().map(move |view| Task::Check { cycle, view })),
             );
             current.extend(views().map(|view| Task::Search { cycle: last, view }));
             current.extend(views().map(|view| Task::Check { cycle: last, view }));
         }
+        let wanted = self.options.output.write;
         let damaged = |task: &Task| -> Option<(Task, Error)> {
+            let may_be_gone = match task {
+                Task::Finish { view } if is_complete => {
+                    temporary_files(&self.workspace, &self.scene.views()[*view].name, &wanted)
+                }
+                _ => Vec::new(),
+            };
             let record: Option<Record> = self.record(*task);
-            record.and_then(|record| record.verify(&self.folder).err()).map(|error| (*task, error))
+            record
+                .and_then(|record| record.verify(&self.folder, &may_be_gone).err())
+                .map(|error| (*task, error))
         };
         let mut begin_anew = false;
         let broken: Vec<_> = current.par_iter().filter_map(damaged).collect();
+        // A damaged map is made again from the estimates, if they are still there.
+        let is_map_broken = broken.iter().any(|(task, _)| matches!(task, Task::Finish { .. }));
+        if is_finished && is_map_broken {
+            inputs.extend(views().map(|view| Task::Check { cycle: last, view }));
+            begin_anew = !self.folder.estimates().exists();
+        }
+        // The maps that a cloud is made again from may be gone, too.
+        let is_cloud_broken = broken.iter().any(|(task, _)| *task == Task::Fuse);
+        begin_anew |= is_complete && is_cloud_broken && !wanted.has_fused_maps();
         for (task, error) in broken {
-            // Without estimates a damaged map cannot be made from what is there.
-            begin_anew |= is_complete && matches!(task, Task::Finish { .. });
             warnings.push(format!("{error}; it is made again"));
             let _ = std::fs::remove_file(self.folder.record(task));
+        }
+        if begin_anew {
+            inputs.clear();
         }
         let broken: Vec<_> = inputs.par_iter().filter_map(damaged).collect();
         begin_anew |= !broken.is_empty();

@@ -260,5 +260,10 @@ options! {
         /// Multiply the colors of each photograph by a factor for each channel, so that photographs of
         /// different exposure or white balance agree on the points they share.
         compensate_exposure: switch() "switch",
+        /// Side of the cubes in which all points become one: the mean of their positions, normals and colors,
+        /// seen by all of their views. 0 keeps all points.
+        voxel_size: number(0.0 to 1e12) "units of the scene",
+        /// Points of the cloud at most: of more, so many are drawn at random. 0 keeps all points.
+        max_points: count(0 to 4294967295) "points",
     }
 }

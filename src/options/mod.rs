@@ -5,6 +5,7 @@
 
 mod groups;
 mod input;
+mod output;
 mod presets;
 mod schedule;
 mod value;
@@ -19,6 +20,7 @@ pub use groups::{
 };
 pub use input::InputOptions;
 use input::TextEntry;
+pub use output::{CloudFormat, OutputOptions, ViewFiles};
 pub use schedule::{Scale, ScheduleOptions};
 use schedule::{scales_from_text, scales_to_text};
 #[cfg(feature = "capi")]
@@ -63,6 +65,8 @@ pub struct Options {
     pub refine: RefineOptions,
     /// Fusion into points.
     pub fusion: FusionOptions,
+    /// What a run in a folder writes; nothing else depends on it.
+    pub output: OutputOptions,
 }
 
 /// The name of the best instruction set that the machine supports.
@@ -111,8 +115,32 @@ const SCALES: TextEntry = TextEntry {
 };
 
 fn texts() -> impl Iterator<Item = &'static TextEntry> {
-    [&SIMD].into_iter().chain(input::TEXTS).chain([&SCALES])
+    [&SIMD].into_iter().chain(input::TEXTS).chain([&SCALES, &WRITE, &CLOUD_FORMAT])
 }
+
+const WRITE: TextEntry = TextEntry {
+    c_name: c"output.write",
+    explanation: "Files of each view: some of depth, normals, confidence, status, graphs, previews, \
+                  separated by commas; with + or - before each name they are added to those of the default \
+                  or left out.",
+    unit: "text",
+    get: |options| options.output.write.to_string(),
+    set: |options, text| {
+        options.output.write = text.parse()?;
+        Ok(())
+    },
+};
+
+const CLOUD_FORMAT: TextEntry = TextEntry {
+    c_name: c"output.cloud_format",
+    explanation: "Format of the cloud: ply, las or laz.",
+    unit: "name",
+    get: |options| options.output.cloud_format.name().to_owned(),
+    set: |options, text| {
+        options.output.cloud_format = CloudFormat::from_name(text)?;
+        Ok(())
+    },
+};
 
 /// The option whose text may have a unit.
 const MEMORY: &str = "memory";
@@ -146,6 +174,15 @@ const OTHERS: &[Entry] = &[
         get: |options| options.schedule.min_changed_fraction,
         set: |options, value| options.schedule.min_changed_fraction = value,
     },
+    Entry {
+        c_name: c"output.splat",
+        explanation: "Write a scene for Gaussian splatting too, in `splat/`: photographs, cameras, and the \
+                      cloud as the points to start from.",
+        unit: "switch",
+        kind: Kind::Switch,
+        get: |options| f64::from(u8::from(options.output.splat)),
+        set: |options, value| options.output.splat = value != 0.0,
+    },
 ];
 
 fn numbers() -> impl Iterator<Item = &'static Entry> {
@@ -160,6 +197,7 @@ impl Options {
     pub fn check(&self) -> Result<()> {
         self.check_scales()?;
         self.input.bounds()?;
+        self.output.cloud_format.check()?;
         for entry in numbers() {
             entry.kind.check(entry.name(), (entry.get)(self))?;
         }
@@ -185,10 +223,11 @@ impl Options {
 
     /// All options, in the order in which they are listed: name, explanation, unit and values of each.
     pub fn infos() -> impl Iterator<Item = OptionInfo> {
-        let [threads, memory, min_changed] = [0, 1, 2].map(|index: usize| OTHERS[index].info());
+        let [threads, memory, min_changed, splat] = [0, 1, 2, 3].map(|index: usize| OTHERS[index].info());
         let input = input::NUMBERS.iter().map(Entry::info).chain(input::TEXTS.iter().map(TextEntry::info));
         let of_run = [SEED, threads, memory, SIMD.info()].into_iter().chain(input);
-        of_run.chain([SCALES.info(), min_changed]).chain(GROUPED.iter().map(Entry::info))
+        let of_method = [SCALES.info(), min_changed].into_iter().chain(GROUPED.iter().map(Entry::info));
+        of_run.chain(of_method).chain([WRITE.info(), CLOUD_FORMAT.info(), splat])
     }
 
     /// The groups with a sentence on each, in the order of the options.
@@ -196,7 +235,8 @@ impl Options {
         let schedule = ("schedule", "Schedule: the scales of a run and the cycles on each.");
         let trimmed = |&(name, text): &(&'static str, &'static str)| (name, text.trim_start());
         let input = ("input", "Input: what a run takes from a scene in files.");
-        [input, schedule].into_iter().chain(groups::GROUPS.iter().map(trimmed))
+        let output = ("output", "Output: what a run in a folder writes; it changes no values.");
+        [input, schedule].into_iter().chain(groups::GROUPS.iter().map(trimmed)).chain([output])
     }
 
     /// The description of the option of this name.

@@ -1,8 +1,8 @@
 //! The presets.
 
 use super::{
-    CheckOptions, CostOptions, FusionOptions, InputOptions, Options, RefineOptions, Scale, ScheduleOptions,
-    SearchOptions, ViewSelectionOptions, WindowOptions,
+    CheckOptions, CostOptions, FusionOptions, InputOptions, Options, OutputOptions, RefineOptions, Scale,
+    ScheduleOptions, SearchOptions, ViewSelectionOptions, WindowOptions,
 };
 use crate::error::{Error, Result};
 
@@ -103,7 +103,10 @@ impl Options {
                 min_agreeing_fraction: 0.0,
                 min_confidence: 0.0,
                 compensate_exposure: false,
+                voxel_size: 0.0,
+                max_points: 0,
             },
+            output: OutputOptions::default(),
         }
     }
 

@@ -7,6 +7,8 @@ mod import;
 #[cfg(unix)]
 mod interruption;
 mod layouts;
+#[cfg(unix)]
+mod outputs;
 mod progress;
 mod refusals;
 mod run_folder;
@@ -269,7 +271,7 @@ fn parts_of_the_method_can_be_left_out_quietly() {
 fn the_embedded_scene_end_to_end() {
     let repository = files(&board());
     let scene = copied_board();
-    let output = skep(&["reconstruct", path(&scene)]);
+    let output = skep(&["reconstruct", path(&scene), "--write", "+graphs"]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     let dense = scene.path().join("dense");
     let report = report(&dense);

@@ -93,7 +93,9 @@ fn a_task_before_its_inputs_is_refused_and_names_what_is_missing() {
 
 #[test]
 fn damaged_files_are_named_and_made_again() {
-    let (scene, output) = finished();
+    let scene = small_board();
+    let (output, more) = (scene.path().join("dense"), ["--write", "+graphs"]);
+    reconstruct(scene.path(), &output, &more);
     let expected = results(&output);
     let files = [
         "fused.ply",
@@ -103,15 +105,15 @@ fn damaged_files_are_named_and_made_again() {
     ];
     for file in files {
         flip_a_bit(&output.join(file));
-        let warnings = reconstruct(scene.path(), &output, &[]);
+        let warnings = reconstruct(scene.path(), &output, &more);
         assert!(warnings.contains(file) && warnings.contains("damaged"), "{file}: {warnings}");
         assert!(results(&output) == expected, "{file}");
     }
     fs::write(output.join("fused.ply.vis"), "short").unwrap();
-    let warnings = reconstruct(scene.path(), &output, &[]);
+    let warnings = reconstruct(scene.path(), &output, &more);
     assert!(warnings.contains("5 bytes; the run wrote"), "{warnings}");
     fs::write(output.join("run/manifest.json"), "{").unwrap();
-    let warnings = reconstruct(scene.path(), &output, &[]);
+    let warnings = reconstruct(scene.path(), &output, &more);
     assert!(warnings.contains("not a manifest of a run"), "{warnings}");
     assert!(results(&output) == expected);
 }

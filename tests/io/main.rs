@@ -1,6 +1,8 @@
 //! Readers and writers of scene and map files.
 #![cfg(feature = "io")]
 
+mod clouds;
+mod float_maps;
 mod maps;
 mod model;
 mod pictures;

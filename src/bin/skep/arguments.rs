@@ -1,5 +1,6 @@
 //! The arguments of the command line, and their help.
 
+use crate::output_arguments::{CloudArguments, Convert, OutputArguments};
 use crate::progress::Messages;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use skep::{DepthRange, Options, Result};
@@ -32,6 +33,8 @@ pub enum Command {
     /// Fuse existing depth and normal maps, of skep or of COLMAP, into a cloud
     #[command(after_help = FUSE_HELP)]
     Fuse(Fuse),
+    /// Write the depth, normal and confidence maps of a workspace in formats of other programs
+    Convert(Convert),
     /// Show version, instruction set, threads and every option of the presets, or explain one option
     Info(Info),
 }
@@ -79,6 +82,8 @@ pub struct Run {
     /// the machine or its control group allows]
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     memory: Option<u64>,
+    #[command(flatten)]
+    files: OutputArguments,
     /// Begin anew where a run in the folder would go on
     #[arg(long)]
     pub fresh: bool,
@@ -254,9 +259,11 @@ pub struct Fuse {
     /// Folder with images/ and sparse/ that the maps belong to [default: WORKSPACE or the folder above it]
     #[arg(long, value_name = "SCENE")]
     pub scene: Option<PathBuf>,
-    /// File of the cloud [default: WORKSPACE/fused.ply]
-    #[arg(short, long, value_name = "FILE.ply")]
+    /// File of the cloud, ending in .ply, .las or .laz [default: WORKSPACE/fused.ply]
+    #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    cloud: CloudArguments,
     /// Set an option of the fusion; `skep info` lists those of the group fusion, `skep info NAME` explains
     /// one. May be repeated
     #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
@@ -299,6 +306,7 @@ impl Run {
         if let Some(scales) = &self.schedule {
             options.set("schedule.scales", scales)?;
         }
+        self.files.apply(&mut options)?;
         Ok(options)
     }
 
@@ -314,13 +322,14 @@ impl Run {
 impl Fuse {
     /// Whether the cloud is that of a run in the folder, with the run's options.
     pub fn is_task(&self) -> bool {
-        let changes_nothing = self.set.is_empty() && self.min_confidence.is_none();
+        let changes_nothing =
+            self.set.is_empty() && self.min_confidence.is_none() && self.cloud.are_default();
         let is_run = self.workspace.join("run").join("manifest.json").is_file();
         changes_nothing && self.scene.is_none() && self.output.is_none() && is_run
     }
 
-    /// The options of the fusion, its threads and memory.
-    pub fn options(&self) -> Result<Options> {
+    /// The options of the fusion and of its output, its threads and memory, and the file of the cloud.
+    pub fn options(&self) -> Result<(Options, PathBuf)> {
         let mut options = self.resources.options();
         for (name, value) in &self.set {
             options.set(name, value)?;
@@ -328,13 +337,10 @@ impl Fuse {
         if let Some(least) = self.min_confidence {
             options.fusion.min_confidence = least;
         }
+        self.cloud.apply(&mut options)?;
         options.check()?;
-        Ok(options)
-    }
-
-    /// The file of the cloud.
-    pub fn output(&self) -> PathBuf {
-        self.output.clone().unwrap_or_else(|| self.workspace.join("fused.ply"))
+        let file = self.cloud.file(self.output.as_deref(), &self.workspace, &options)?;
+        Ok((options, file))
     }
 }
 
@@ -364,7 +370,7 @@ The scene:
   masks and their model are written into the folder of the results; the maps belong to those.
 
 Results, in COLMAP's layouts:
-  fused.ply                        the cloud: position, normal, color
+  fused.ply                        the cloud: position, normal, color (--cloud-format las: fused.las)
   fused.ply.vis                    the views each point was fused from
   preview/NAME.depth.png           previews: depth, normal and number of source views of
           NAME.normal.png          each pixel; black where no plane was validated
@@ -372,7 +378,8 @@ Results, in COLMAP's layouts:
           NAME.confidence.png
   stereo/depth_maps/NAME.photometric.bin    the raw estimate of every pixel
   stereo/depth_maps/NAME.geometric.bin      the validated pixels only
-  stereo/normal_maps, stereo/consistency_graphs    likewise: normals, and the view set of each pixel
+  stereo/normal_maps               likewise; --write +graphs adds stereo/consistency_graphs, the view set
+                                   of each pixel, --write +status stereo/status_maps: docs/formats.md
   stereo/confidence_maps           likewise, as depth maps: the probability of each depth to be within 1 %
   images, sparse                   copy of the scene, for COLMAP: the folder is a workspace
                                    of `colmap stereo_fusion --workspace_path DIR ...`
@@ -420,9 +427,10 @@ const FUSE_HELP: &str = "\
 The workspace is what `skep reconstruct` or `colmap patch_match_stereo` writes: stereo/depth_maps and
 stereo/normal_maps. Its scene, images/ and sparse/, is in WORKSPACE or in the folder above it.
 The geometric (validated) maps are fused if any view has one, else the photometric (raw) ones.
-FILE.ply.vis, the views of each point, is written beside FILE.ply.
+FILE.vis, the views of each point, is written beside FILE.
 In the folder of a run of skep, without other arguments, this is the run's last task, with its options.
 
 Examples:
   skep fuse SCENE/dense
-  skep fuse SCENE/dense --output cloud.ply";
+  skep fuse SCENE/dense --output cloud.laz
+  skep fuse SCENE/dense --output small.ply --voxel 0.02 --max-points 1000000 --splat";

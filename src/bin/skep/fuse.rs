@@ -17,7 +17,7 @@ pub fn run(arguments: &Fuse, interrupt: &Interrupt) -> Result<(), Failure> {
     if arguments.is_task() {
         return task(arguments, display, interrupt);
     }
-    let options = arguments.options().map_err(Failure::Usage)?;
+    let (options, output) = arguments.options().map_err(Failure::Usage)?;
     display.print(&format!("reading {}", arguments.workspace.display()));
     let workspace = Workspace::new(&arguments.workspace);
     let scene = match &arguments.scene {
@@ -30,7 +30,6 @@ pub fn run(arguments: &Fuse, interrupt: &Interrupt) -> Result<(), Failure> {
     let maps = workspace.maps(&scene)?;
     missing_files(&maps).iter().for_each(|warning| streams::warning(warning));
 
-    let output = arguments.output();
     let reporter = display.start();
     let progress = |progress: &Progress| {
         reporter.show(progress);

@@ -1,10 +1,12 @@
 //! The command line.
 
 mod arguments;
+mod convert;
 mod dump;
 mod fuse;
 mod info;
 mod interrupt;
+mod output_arguments;
 mod plan_files;
 mod progress;
 mod reconstruct;
@@ -36,6 +38,7 @@ fn main() -> ExitCode {
         Command::Next(arguments) => tasks::next(&arguments, &interrupt),
         Command::Finish(arguments) => tasks::finish(&arguments, &interrupt),
         Command::Fuse(arguments) => fuse::run(&arguments, &interrupt),
+        Command::Convert(arguments) => convert::run(&arguments, &interrupt),
         Command::Info(arguments) => info::run(&arguments),
     };
     match result {

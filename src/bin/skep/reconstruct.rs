@@ -6,9 +6,8 @@ use crate::progress::Display;
 use crate::report::{Report, Totals};
 use crate::stopwatch::{Stage, Stopwatch, Times};
 use crate::{Failure, dump, streams};
-use skep::io::Workspace;
 use skep::job::{Job, Needs, Summary};
-use skep::{DepthRange, Error, Options, PixelStatus, Progress, Result, Scene, format_bytes};
+use skep::{DepthRange, Error, Options, PixelStatus, Progress, Result, format_bytes};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -72,7 +71,7 @@ pub fn conclude(
     }
     warning.iter().for_each(|warning| streams::warning(warning));
     if !quiet {
-        summary(output, scene, &ranges, &report.totals).iter().for_each(|line| streams::result(line));
+        summary(job, &ranges, &report.totals).iter().for_each(|line| streams::result(line));
     }
     Ok(())
 }
@@ -163,16 +162,22 @@ fn report_path(output: &Path) -> PathBuf {
 }
 
 /// The last lines: the written files and, if the cloud is empty or thin, the reasons.
-fn summary(output: &Path, scene: &Scene, ranges: &[DepthRange], totals: &Totals) -> Vec<String> {
-    let workspace = Workspace::new(output);
+fn summary(job: &Job, ranges: &[DepthRange], totals: &Totals) -> Vec<String> {
+    let (workspace, scene, written) = (job.workspace(), job.scene(), job.options().output);
+    let output = workspace.folder();
     let validated = share(totals, PixelStatus::Validated);
     let mut lines = vec![
         format!("{} views, {validated:.1} % of {} pixels validated", scene.views().len(), totals.pixels),
-        format!("{} points in {}", totals.points, workspace.cloud().display()),
+        format!("{} points in {}", totals.points, workspace.cloud_as(written.cloud_format).display()),
     ];
     lines.extend(reasons(totals, ranges));
     let first = &scene.views()[0].name;
-    lines.push(format!("previews such as {}", workspace.preview(first, "depth").display()));
+    if written.splat {
+        lines.push(format!("scene for Gaussian splatting in {}", workspace.splat().display()));
+    }
+    if written.write.previews {
+        lines.push(format!("previews such as {}", workspace.preview(first, "depth").display()));
+    }
     lines.push(format!("maps in {}", output.join("stereo").display()));
     lines.push(format!("counts and times in {}", report_path(output).display()));
     lines.extend(totals.wall_seconds.map(|seconds| format!("done in {seconds:.1} s")));

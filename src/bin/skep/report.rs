@@ -113,8 +113,9 @@ impl Report {
 /// The preset with these options, apart from those that do not change the result.
 fn preset_of(options: &Options) -> Option<&'static str> {
     Options::PRESETS.into_iter().find(|name| {
-        let Options { threads, memory, simd, .. } = *options;
-        Options::preset(name).is_ok_and(|preset| Options { threads, memory, simd, ..preset } == *options)
+        let Options { threads, memory, simd, output, .. } = *options;
+        Options::preset(name)
+            .is_ok_and(|preset| Options { threads, memory, simd, output, ..preset } == *options)
     })
 }
 

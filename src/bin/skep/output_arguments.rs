@@ -1,0 +1,128 @@
+//! The arguments on what a command writes.
+
+use clap::{Args, ValueEnum};
+use skep::{CloudFormat, Options, Result, ViewFiles};
+use std::path::{Path, PathBuf};
+
+/// The cloud.
+#[derive(Args)]
+pub struct CloudArguments {
+    /// Thin the cloud to one point in each cube with sides of SIZE, in units of the model
+    #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
+    voxel: Option<f64>,
+    /// Thin the cloud to N points at most, drawn at random
+    #[arg(long, value_name = "N")]
+    max_points: Option<u32>,
+    /// Format of the cloud: ply, las or laz [default: ply]
+    #[arg(long, value_name = "FORMAT", value_parser = CloudFormat::from_name)]
+    cloud_format: Option<CloudFormat>,
+    /// Also write a scene for Gaussian splatting beside the cloud: splat/images, and splat/sparse/0 with the
+    /// cameras and the cloud as the points to start from
+    #[arg(long)]
+    splat: bool,
+}
+
+impl CloudArguments {
+    /// Whether none of them is given.
+    pub fn are_default(&self) -> bool {
+        let CloudArguments { voxel, max_points, cloud_format, splat } = self;
+        voxel.is_none() && max_points.is_none() && cloud_format.is_none() && !splat
+    }
+
+    /// Sets the options that are given.
+    ///
+    /// # Errors
+    /// A value out of its range.
+    pub fn apply(&self, options: &mut Options) -> Result<()> {
+        if let Some(size) = self.voxel {
+            options.set_number("fusion.voxel_size", size)?;
+        }
+        if let Some(most) = self.max_points {
+            options.fusion.max_points = most;
+        }
+        if let Some(format) = self.cloud_format {
+            options.output.cloud_format = format;
+        }
+        options.output.splat |= self.splat;
+        Ok(())
+    }
+
+    /// The file of the cloud: `output`, whose ending must be that of the format if both are given, else
+    /// `fused.FORMAT` in the folder.
+    ///
+    /// # Errors
+    /// Another ending.
+    pub fn file(&self, output: Option<&Path>, folder: &Path, options: &Options) -> Result<PathBuf> {
+        let Some(output) = output else {
+            return Ok(folder.join(format!("fused.{}", options.output.cloud_format.name())));
+        };
+        let found = CloudFormat::of_file(output)?;
+        match self.cloud_format {
+            Some(format) if format != found => Err(skep::Error::argument(
+                "--output",
+                output.display(),
+                format!("a name that ends in .{}, as --cloud-format says", format.name()),
+            )),
+            _ => Ok(output.to_owned()),
+        }
+    }
+}
+
+/// The files of a run.
+#[derive(Args)]
+pub struct OutputArguments {
+    /// Files to write for each view: some of depth, normals, confidence, status, graphs, previews; with + or
+    /// - before each they are added to the default or left out [default: depth,normals,confidence,previews]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    write: Option<ViewFiles>,
+    #[command(flatten)]
+    cloud: CloudArguments,
+}
+
+impl OutputArguments {
+    /// Sets the options that are given.
+    ///
+    /// # Errors
+    /// A value out of its range.
+    pub fn apply(&self, options: &mut Options) -> Result<()> {
+        if let Some(files) = self.write {
+            options.output.write = files;
+        }
+        self.cloud.apply(options)
+    }
+}
+
+/// A format of maps.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ConvertFormat {
+    /// Portable float maps, rows from the bottom to the top
+    Pfm,
+    /// Arrays of NumPy
+    Npy,
+    /// TIFF of 32-bit floats
+    Tiff,
+    /// Depth maps of OpenMVS, with normals and confidence
+    Dmap,
+}
+
+#[derive(Args)]
+pub struct Convert {
+    /// Folder that holds stereo/depth_maps, of skep or of COLMAP
+    pub workspace: PathBuf,
+    /// Format of the maps
+    #[arg(long, value_name = "FORMAT")]
+    pub to: ConvertFormat,
+    /// Folder for them: depth_maps/NAME.FORMAT, normal_maps and confidence_maps; dmap: depth0000.dmap and so
+    /// on
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Folder with sparse/ that the maps belong to [default: WORKSPACE or the folder above it]
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Option<PathBuf>,
+    /// Take the photometric (raw) maps instead of the geometric (validated) ones
+    #[arg(long)]
+    pub raw: bool,
+    /// Print warnings and errors only
+    #[arg(short, long)]
+    pub quiet: bool,
+}
