@@ -16,7 +16,7 @@ fn colony(criterion: &mut Criterion) {
     let width = view.camera.width as usize;
     let is_in_tile =
         |pixel: usize| (32..96).contains(&(pixel % width)) && (16..80).contains(&(pixel / width));
-    view.mask = Some((0..view.camera.pixels()).map(is_in_tile).collect());
+    view.mask = Some((0..view.camera.pixels()).map(is_in_tile).collect::<Vec<_>>().into());
     let scene = scene.scene();
 
     let mut group = criterion.benchmark_group("a tile of 64 x 64 pixels");
