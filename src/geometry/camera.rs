@@ -34,13 +34,17 @@ impl Camera {
     pub const MAX_SIDE: u32 = 32_768;
 
     /// Smallest and largest focal length, in pixels: no lens is beyond, and angles stay exact.
-    pub const FOCAL_LENGTHS: RangeInclusive<f64> = 1e-3..=1e9;
+    pub(crate) const FOCAL_LENGTHS: RangeInclusive<f64> = 1e-3..=1e9;
     /// Largest distance of the principal point from the top-left pixel along x and y, in pixels.
-    pub const MAX_PRINCIPAL_POINT: f64 = 1e9;
+    pub(crate) const MAX_PRINCIPAL_POINT: f64 = 1e9;
     /// Largest component of the translation, in world units: its square is finite in f32.
-    pub const MAX_TRANSLATION: f64 = 1e18;
+    pub(crate) const MAX_TRANSLATION: f64 = 1e18;
 
     /// Returns an error unless every field is in its valid range; `name` names the camera in the error.
+    ///
+    /// # Errors
+    /// Focal lengths beyond 0.001 to 1e9 pixels; a principal point beyond 1e9 pixels; a translation beyond
+    /// 1e18 world units; a matrix that is no rotation; sides beyond 1 to [`Camera::MAX_SIDE`] pixels.
     pub fn check(&self, name: &str) -> Result<()> {
         for (field, side) in [("width", self.width), ("height", self.height)] {
             if side == 0 || side > Self::MAX_SIDE {
