@@ -460,6 +460,26 @@ size_t skep_last_error(char *buffer, size_t capacity);
  *       Multiply the colors of each photograph by a factor for each channel, so that photographs of different
  *       exposure or white balance agree on the points they share.
  *       switch, true or false; default: true, paper: false
+ *   fusion.voxel_size
+ *       Side of the cubes in which all points become one: the mean of their positions, normals and colors,
+ *       seen by all of their views. 0 keeps all points.
+ *       number, 0 to 1000000000000, units of the scene; default: 0
+ *   fusion.max_points
+ *       Points of the cloud at most: of more, so many are drawn at random. 0 keeps all points.
+ *       whole number, at least 0, points; default: 0
+ *
+ * Output: what a run in a folder writes; it changes no values.
+ *   output.write
+ *       Files of each view: some of depth, normals, confidence, status, graphs, previews, separated by
+ *       commas; with + or - before each name they are added to those of the default or left out.
+ *       default: depth,normals,confidence,previews
+ *   output.cloud_format
+ *       Format of the cloud: ply, las or laz.
+ *       default: ply
+ *   output.splat
+ *       Write a scene for Gaussian splatting too, in `splat/`: photographs, cameras, and the cloud as the
+ *       points to start from.
+ *       switch, true or false; default: false
  */
 
 /**
@@ -2082,14 +2102,16 @@ skep_status skep_result_write_workspace(const struct skep_result *result,
                                         const char *folder);
 
 /**
- * Writes a cloud as binary PLY (x, y, z as floats, normals, colors), and the views of each point beside it
- * in FILE.vis, as COLMAP does.
+ * Writes a cloud as binary PLY (x, y, z, normals, colors), and the views of each point beside it in
+ * FILE.vis, as COLMAP does. x, y and z are float, or double where floats cannot hold the distances of the points, as
+ * with geographic coordinates.
  *
  * @param cloud  The cloud.
  * @param file   Path of the file.
  * @retval SKEP_ERR_FILE  A file that cannot be written.
  */
-skep_status skep_cloud_write_ply(const struct skep_cloud *cloud, const char *file);
+skep_status skep_cloud_write_ply(const struct skep_cloud *cloud,
+                                 const char *file);
 
 /**
  * Writes a depth map in COLMAP's layout.
@@ -2220,7 +2242,8 @@ skep_status skep_read_consistency_graph(const char *file,
  *                            SKEP_TASK_FUSE
  *
  * A task that is done, or of a cycle that the run skips, succeeds at once. The results are files in the
- * folder, which is a COLMAP workspace: stereo/, preview/, fused.ply.
+ * folder, which is a COLMAP workspace: stereo/, preview/, fused.ply. The options of the group "output" choose
+ * among them.
  */
 
 /**

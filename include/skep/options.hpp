@@ -235,6 +235,26 @@
 //       Multiply the colors of each photograph by a factor for each channel, so that photographs of different
 //       exposure or white balance agree on the points they share.
 //       switch, true or false; default: true, paper: false
+//   fusion.voxel_size
+//       Side of the cubes in which all points become one: the mean of their positions, normals and colors,
+//       seen by all of their views. 0 keeps all points.
+//       number, 0 to 1000000000000, units of the scene; default: 0
+//   fusion.max_points
+//       Points of the cloud at most: of more, so many are drawn at random. 0 keeps all points.
+//       whole number, at least 0, points; default: 0
+//
+// Output: what a run in a folder writes; it changes no values.
+//   output.write
+//       Files of each view: some of depth, normals, confidence, status, graphs, previews, separated by
+//       commas; with + or - before each name they are added to those of the default or left out.
+//       default: depth,normals,confidence,previews
+//   output.cloud_format
+//       Format of the cloud: ply, las or laz.
+//       default: ply
+//   output.splat
+//       Write a scene for Gaussian splatting too, in `splat/`: photographs, cameras, and the cloud as the
+//       points to start from.
+//       switch, true or false; default: false
 // END OPTIONS
 #ifndef SKEP_OPTIONS_HPP
 #define SKEP_OPTIONS_HPP

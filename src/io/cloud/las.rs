@@ -114,7 +114,7 @@ fn transform(min: f64, max: f64, spacing: f64) -> Transform {
     let round_to = |value: f64, step: f64| (value / step).round() * step;
     let size = max - min;
     let offset = match size > 0.0 {
-        true => round_to((min + max) / 2.0, power_of_ten(size.log10().floor())),
+        true => round_to((min + max) / 2.0, power_of_ten(size.log10().floor() - 1.0)),
         false => round_to(min, 1.0),
     };
     let wanted = if spacing > 0.0 { power_of_ten((spacing / STEPS).log10().floor()) } else { DEFAULT_SCALE };
@@ -131,45 +131,56 @@ fn power_of_ten(exponent: f64) -> f64 {
 /// A file that keeps its first error to itself: the writer of the crate panics when it is dropped after one.
 struct Sink {
     file: BufWriter<File>,
+    /// Where the file is, and would be without the error: the crate computes with places in the file.
+    place: u64,
+    length: u64,
     first_error: Arc<Mutex<Option<io::Error>>>,
 }
 
 impl Sink {
     fn new(file: File) -> (Sink, Arc<Mutex<Option<io::Error>>>) {
         let first_error = Arc::new(Mutex::new(None));
-        (Sink { file: BufWriter::new(file), first_error: first_error.clone() }, first_error)
+        let sink = Sink { file: BufWriter::new(file), place: 0, length: 0, first_error: first_error.clone() };
+        (sink, first_error)
     }
 
-    fn attempt<T>(
-        &mut self,
-        otherwise: T,
-        operation: impl FnOnce(&mut BufWriter<File>) -> io::Result<T>,
-    ) -> T {
+    /// Does something to the file, unless something failed before.
+    fn attempt(&mut self, operation: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) {
         let mut first_error = self.first_error.lock().unwrap_or_else(PoisonError::into_inner);
-        if first_error.is_some() {
-            return otherwise;
+        if first_error.is_none() {
+            *first_error = operation(&mut self.file).err();
         }
-        operation(&mut self.file).unwrap_or_else(|error| {
-            *first_error = Some(error);
-            otherwise
-        })
     }
 }
 
 impl Write for Sink {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        Ok(self.attempt(bytes.len(), |file| file.write_all(bytes).map(|()| bytes.len())))
+        self.attempt(|file| file.write_all(bytes));
+        self.place += bytes.len() as u64;
+        self.length = self.length.max(self.place);
+        Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.attempt((), |file| file.flush());
+        self.attempt(|file| file.flush());
         Ok(())
     }
 }
 
 impl Seek for Sink {
-    fn seek(&mut self, place: SeekFrom) -> io::Result<u64> {
-        Ok(self.attempt(0, |file| file.seek(place)))
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let place = match to {
+            SeekFrom::Start(place) => Some(place),
+            SeekFrom::Current(offset) => self.place.checked_add_signed(offset),
+            SeekFrom::End(offset) => self.length.checked_add_signed(offset),
+        };
+        self.place = place.ok_or(io::ErrorKind::InvalidInput)?;
+        // Asking for the place must not flush the buffer.
+        if to != SeekFrom::Current(0) {
+            let place = self.place;
+            self.attempt(|file| file.seek(SeekFrom::Start(place)).map(drop));
+        }
+        Ok(self.place)
     }
 }
 

@@ -232,6 +232,21 @@ class Options(Mapping[str, Value]):
     """Multiply the colors of each photograph by a factor for each channel, so that photographs of different
     exposure or white balance agree on the points they share. (switch, true or false; default: true, paper:
     false)"""
+    fusion_voxel_size: float
+    """Side of the cubes in which all points become one: the mean of their positions, normals and colors, seen
+    by all of their views. 0 keeps all points. (number, 0 to 1000000000000, units of the scene; default: 0)"""
+    fusion_max_points: int
+    """Points of the cloud at most: of more, so many are drawn at random. 0 keeps all points. (whole number,
+    at least 0, points; default: 0)"""
+    output_write: str
+    """Files of each view: some of depth, normals, confidence, status, graphs, previews, separated by commas;
+    with + or - before each name they are added to those of the default or left out. (text; default:
+    depth,normals,confidence,previews)"""
+    output_cloud_format: str
+    """Format of the cloud: ply, las or laz. (name; default: ply)"""
+    output_splat: bool
+    """Write a scene for Gaussian splatting too, in `splat/`: photographs, cameras, and the cloud as the
+    points to start from. (switch, true or false; default: false)"""
     # END OPTIONS
 
     def __init__(self, preset: Literal["default", "fast", "paper"] = "default", **values: Value) -> None:
