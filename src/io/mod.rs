@@ -19,7 +19,8 @@ pub use colmap_maps::{
 pub use colmap_model::{ColmapModel, ModelImage};
 pub use files::write_file;
 pub(crate) use files::{
-    cannot_be_read, cannot_be_written, link_or_copy, remove_temporary_files, stays_inside,
+    FileReader, NAME_INSIDE, cannot_be_read, cannot_be_written, link_or_copy, remove_temporary_files,
+    stays_inside,
 };
 pub(crate) use pictures::picture_from_bytes;
 pub use pictures::{picture_size, read_picture, write_picture};
