@@ -10,10 +10,10 @@ mod openmvs;
 mod opensfm;
 
 use glam::DVec3;
+use skep::SparsePoint;
 use skep::geometry::{Camera, Lens};
 use skep::import::{SourceScene, read};
 use skep::io::{ColmapModel, ModelImage};
-use skep::{Result, SparsePoint};
 use std::path::{Path, PathBuf};
 
 fn board() -> PathBuf {

@@ -59,11 +59,11 @@ fn the_scene_is_read_with_and_without_tracks() {
     let folder = scene(&json!([reconstruction(7)]));
     let scene = read(folder.path()).unwrap();
     assert_cameras(&scene);
-    assert_points(&scene.points, false, 0.0);
+    assert_points(&scene.points, false, 1e-12);
     write(&folder.path().join("tracks.csv"), tracks());
     let scene = read(&folder.path().join("reconstruction.json")).unwrap();
     assert_cameras(&scene);
-    assert_points(&scene.points, true, 0.0);
+    assert_points(&scene.points, true, 1e-12);
     assert!(scene.warnings.is_empty());
 }
 
