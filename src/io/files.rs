@@ -101,7 +101,7 @@ pub(crate) fn stays_inside(name: &str) -> bool {
 }
 
 /// What [`stays_inside`] requires, for error texts.
-pub(super) const NAME_INSIDE: &str = "a path below the folder of images, without `..`, `.` or empty parts";
+pub(crate) const NAME_INSIDE: &str = "a path below the folder of images, without `..`, `.` or empty parts";
 
 /// Copies a file atomically.
 pub(crate) fn copy_file(from: &Path, to: &Path) -> Result<()> {
@@ -122,14 +122,14 @@ pub(crate) fn link_or_copy(from: &Path, to: &Path) -> Result<()> {
 }
 
 /// Reads a file sequentially and checks every read against its size.
-pub(super) struct FileReader {
+pub(crate) struct FileReader {
     path: PathBuf,
     reader: BufReader<File>,
     remaining: u64,
 }
 
 impl FileReader {
-    pub(super) fn open(path: &Path) -> Result<FileReader> {
+    pub(crate) fn open(path: &Path) -> Result<FileReader> {
         let open = || -> io::Result<(File, u64)> {
             let file = File::open(path)?;
             let metadata = file.metadata()?;
@@ -143,18 +143,18 @@ impl FileReader {
     }
 
     /// An error that names the file.
-    pub(super) fn error(&self, problem: impl std::fmt::Display) -> Error {
+    pub(crate) fn error(&self, problem: impl std::fmt::Display) -> Error {
         Error::file(&self.path, problem)
     }
 
     /// Bytes not read yet.
-    pub(super) fn remaining(&self) -> u64 {
+    pub(crate) fn remaining(&self) -> u64 {
         self.remaining
     }
 
     /// Returns an error unless `count` entries of `size` bytes remain: call it before any allocation of that
     /// size.
-    pub(super) fn require(&self, count: u64, size: u64, what: &str) -> Result<()> {
+    pub(crate) fn require(&self, count: u64, size: u64, what: &str) -> Result<()> {
         match count.checked_mul(size) {
             Some(bytes) if bytes <= self.remaining => Ok(()),
             _ => {
@@ -165,29 +165,29 @@ impl FileReader {
         }
     }
 
-    pub(super) fn fill(&mut self, buffer: &mut [u8], what: &str) -> Result<()> {
+    pub(crate) fn fill(&mut self, buffer: &mut [u8], what: &str) -> Result<()> {
         self.require(1, buffer.len() as u64, what)?;
         self.reader.read_exact(buffer).map_err(|error| cannot_be_read(&self.path, error))?;
         self.remaining -= buffer.len() as u64;
         Ok(())
     }
 
-    pub(super) fn bytes<const N: usize>(&mut self, what: &str) -> Result<[u8; N]> {
+    pub(crate) fn bytes<const N: usize>(&mut self, what: &str) -> Result<[u8; N]> {
         let mut buffer = [0; N];
         self.fill(&mut buffer, what)?;
         Ok(buffer)
     }
 
-    pub(super) fn u32(&mut self, what: &str) -> Result<u32> {
+    pub(crate) fn u32(&mut self, what: &str) -> Result<u32> {
         self.bytes(what).map(u32::from_le_bytes)
     }
 
-    pub(super) fn u64(&mut self, what: &str) -> Result<u64> {
+    pub(crate) fn u64(&mut self, what: &str) -> Result<u64> {
         self.bytes(what).map(u64::from_le_bytes)
     }
 
     /// Numbers that must be finite.
-    pub(super) fn f64s<const N: usize>(&mut self, what: &str) -> Result<[f64; N]> {
+    pub(crate) fn f64s<const N: usize>(&mut self, what: &str) -> Result<[f64; N]> {
         let mut values = [0.0; N];
         for value in &mut values {
             *value = f64::from_le_bytes(self.bytes(what)?);
@@ -199,7 +199,7 @@ impl FileReader {
     }
 
     /// Skips `count` entries of `size` bytes.
-    pub(super) fn skip(&mut self, count: u64, size: u64, what: &str) -> Result<()> {
+    pub(crate) fn skip(&mut self, count: u64, size: u64, what: &str) -> Result<()> {
         self.require(count, size, what)?;
         let bytes = count * size;
         self.reader.seek_relative(bytes as i64).map_err(|error| cannot_be_read(&self.path, error))?;
@@ -208,7 +208,7 @@ impl FileReader {
     }
 
     /// Returns an error if bytes remain.
-    pub(super) fn finish(self) -> Result<()> {
+    pub(crate) fn finish(self) -> Result<()> {
         match self.remaining {
             0 => Ok(()),
             bytes => Err(self.error(format!("{bytes} bytes too many after the last entry"))),

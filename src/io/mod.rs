@@ -29,8 +29,8 @@ pub use colmap_maps::{
 pub use colmap_model::{ColmapModel, ModelImage};
 pub use files::write_file;
 pub(crate) use files::{
-    NewFolders, cannot_be_read, cannot_be_written, check_file_place, link_or_copy, remove_temporary_files,
-    stays_inside,
+    FileReader, NAME_INSIDE, NewFolders, cannot_be_read, cannot_be_written, check_file_place, link_or_copy,
+    remove_temporary_files, stays_inside,
 };
 pub(crate) use fingerprint::{Fingerprint, fingerprint, fingerprint_file, text};
 pub use maps::{DepthMapFile, MapFormat, write_dmap, write_float_map};
