@@ -50,7 +50,7 @@ def test_floats_beyond_white_are_refused_with_the_value_and_the_remedy():
         (image, 100, "is 255: must be at most 100"),
         (image * 100, None, "white=25500"),
         (image / 255 - 0.5, None, "smallest value of the float32 image is -0.5: must be at least 0"),
-        (np.where(image == 255, np.float32(np.inf), 0), None, "is inf"),
+        (np.where(image == 255, np.inf, 0).astype(np.float32), None, "is inf"),
         (BYTES.astype(np.uint16), 200, "largest value of the uint16 image is 255: must be at most 200"),
         (image, 0, "white is 0"),
         (image, float("nan"), "white is nan"),
