@@ -23,7 +23,12 @@ fn main() {
         _ => (),
     }
 
-    println!("cargo:rerun-if-changed=src");
+    // Not the Python package, whose changes would compile the crate anew.
+    for entry in std::fs::read_dir("src").into_iter().flatten().flatten() {
+        if entry.file_name() != "python" {
+            println!("cargo:rerun-if-changed={}", entry.path().display());
+        }
+    }
     println!("cargo:rustc-env=SKEP_SOURCE_FINGERPRINT={:08x}", source_fingerprint() as u32);
 
     let template =

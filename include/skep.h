@@ -620,12 +620,14 @@ typedef struct skep_camera {
 #define SKEP_FORMAT_BGRA 4
 
 /**
- * Added to a layout: channels of uint16_t in the machine's byte order, 0 to 65535.
+ * Added to a layout: channels of uint16_t in the machine's byte order, 0 to 65535. Scale samples of fewer
+ * bits to that range, or most of the gray values are lost: 12 bits, 0 to 4095, by 65535 / 4095.
  */
 #define SKEP_FORMAT_16 16
 
 /**
- * Added to a layout: channels of float, 0 to 1; values outside are clamped, NaN is refused.
+ * Added to a layout: channels of float, 0 (black) to 1 (white). Values up to 1/255 outside, as interpolation
+ * leaves them, are clamped; others and NaN are refused, so scale pixels of 0 to 255 by 1/255.
  */
 #define SKEP_FORMAT_FLOAT 32
 
@@ -673,6 +675,14 @@ typedef struct skep_image {
  * @param scene_out  Receives the scene; destroy it with skep_scene_destroy.
  */
 skep_status skep_scene_create(struct skep_scene **scene_out);
+
+/**
+ * Copies a scene: later changes of one do not affect the other. Images are shared, not copied.
+ *
+ * @param scene      The scene.
+ * @param scene_out  Receives the copy; destroy it with skep_scene_destroy.
+ */
+skep_status skep_scene_copy(const struct skep_scene *scene, struct skep_scene **scene_out);
 
 /**
  * Destroys a scene. Results, steppers and clouds created from it are not affected.
@@ -825,6 +835,24 @@ skep_status skep_scene_get_depth_range(const struct skep_scene *scene,
                                        uint32_t view,
                                        double *near_out,
                                        double *far_out);
+
+/**
+ * Copies one of the warnings about a scene, such as that a view saw no sparse point and where its depth
+ * range comes from. Those about source views depend on the options: skep_result_get_warning gives them.
+ *
+ * @param scene       The scene.
+ * @param index       Index of the warning, from 0.
+ * @param buffer      Receives up to `capacity` bytes, the last one NUL; may be NULL to ask for the size.
+ * @param capacity    Bytes of room in `buffer`; a longer text is cut.
+ * @param needed_out  Receives the bytes of the whole text with its NUL; may be NULL.
+ * @retval SKEP_ERR_ARGUMENT  `index` is not below the number of warnings: all have been listed; or a scene
+ *                            that skep_scene_validate refuses.
+ */
+skep_status skep_scene_get_warning(const struct skep_scene *scene,
+                                   size_t index,
+                                   char *buffer,
+                                   size_t capacity,
+                                   size_t *needed_out);
 
 /**
  * Gets the source views that a run with these options matches a view with. Of more than 1,000 views only

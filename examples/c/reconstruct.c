@@ -15,7 +15,7 @@ static void interrupt(int number) {
 
 /* Called by the library about a hundred times a second; non-zero cancels the run. */
 static int32_t print_progress(void *user, const skep_progress *at) {
-    static const char *const PHASES[] = {"search", "check", "fusion"};
+    static const char *const PHASES[] = {"search", "check", "fusion", "read"};
     (void)user;
     fprintf(stderr, "\r%3.0f %%  %s at 1/%u, cycle %u, view %u of %u    ", 100 * at->done,
             PHASES[at->phase], (unsigned)at->downscale, (unsigned)at->cycle + 1,
@@ -51,6 +51,20 @@ static void print_view(const skep_scene *scene, const skep_result *result, uint3
     printf(" %.1f M NCC evaluations\n", (double)statistics.ncc_evaluations / 1e6);
 }
 
+/* What the user should know: depth ranges that no point supports, views without source views. */
+static void print_warnings(const skep_scene *scene, const skep_result *result) {
+    char text[1024];
+    size_t index;
+    for (index = 0;
+         skep_scene_get_warning(scene, index, text, sizeof text, NULL) == SKEP_OK; ++index) {
+        fprintf(stderr, "warning: %s\n", text);
+    }
+    for (index = 0;
+         skep_result_get_warning(result, index, text, sizeof text, NULL) == SKEP_OK; ++index) {
+        fprintf(stderr, "warning: %s\n", text);
+    }
+}
+
 int main(int count, char **arguments) {
     skep_scene *scene = NULL;
     skep_options *options = NULL;
@@ -68,6 +82,7 @@ int main(int count, char **arguments) {
     check(skep_options_set(options, "fusion.min_agreeing_views", 2));
     check(skep_reconstruct(scene, options, print_progress, NULL, &result));
     fprintf(stderr, "\n");
+    print_warnings(scene, result);
     check(skep_scene_get_view_count(scene, &views));
     for (view = 0; view < views; ++view) {
         print_view(scene, result, view);

@@ -41,8 +41,10 @@ int main(int argc, char **argv) try {
         std::printf("\r%3.0f %%", 100 * progress.done);
         std::fflush(stdout);
     });
-    for (const std::string &warning : result.warnings())
-        std::printf("\n%s", warning.c_str());
+    // What the user should know: depth ranges that no point supports, views without source views.
+    for (const auto &warnings : {model.warnings(), result.warnings()})
+        for (const std::string &warning : warnings)
+            std::printf("\n%s", warning.c_str());
 
     const skep::Cloud cloud = result.cloud();
     cloud.write_ply(argv[2]);

@@ -235,6 +235,26 @@ static void check_extremes(const skep_options *options) {
     }
 }
 
+/* A copy changes by itself; it warns of a range that no point supports. View 4 has no points. */
+static void check_copy_and_warnings(const skep_scene *original) {
+    skep_scene *copy = NULL;
+    char warning[256] = "";
+    size_t needed = 0;
+    double near_by = 0, far_away = 0;
+    REQUIRE(skep_scene_copy(original, &copy));
+    REQUIRE(skep_scene_set_depth_range(copy, 4, 0, 0));
+    REQUIRE(skep_scene_get_warning(copy, 0, warning, sizeof warning, &needed));
+    CHECK(strstr(warning, "view0004.png saw no sparse point") && needed == strlen(warning) + 1,
+          "%s", warning);
+    FAILS(skep_scene_get_warning(copy, 1, warning, sizeof warning, NULL), SKEP_ERR_ARGUMENT,
+          "number of warnings, 1");
+    FAILS(skep_scene_get_warning(original, 0, warning, sizeof warning, NULL), SKEP_ERR_ARGUMENT,
+          "number of warnings, 0");
+    REQUIRE(skep_scene_get_depth_range(original, 4, &near_by, &far_away));
+    CHECK(near_by == 1 && far_away == 4, "%g to %g", near_by, far_away);
+    skep_scene_destroy(copy);
+}
+
 /* What was asked for before a change is derived anew after it. */
 static void check_queries_after_changes(void) {
     static const uint8_t PIXELS[3] = {10, 200, 30};
@@ -268,6 +288,7 @@ static void check_queries_after_changes(void) {
         REQUIRE(skep_scene_get_triangulation_angle(changing, 0, 1, &same));
         CHECK(same < degrees, "%g degrees at the points, %g in the middle", same, degrees);
     }
+    check_copy_and_warnings(changing);
     skep_scene_destroy(changing);
 }
 

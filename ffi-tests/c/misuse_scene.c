@@ -169,6 +169,18 @@ static void check_images(skep_scene *handed_in, const skep_image *good, const sk
     const skep_image nan = {not_numbers, 2, 2, 8, SKEP_FORMAT_GRAY + SKEP_FORMAT_FLOAT};
     FAILS(skep_scene_add_view(handed_in, NULL, &nan, camera, NULL), SKEP_ERR_ARGUMENT,
           "column 1, row 1");
+    /* Pixels of 0 to 255, and of an image from which the mean was subtracted. */
+    static const struct {
+        float value;
+        const char *text;
+    } OUTSIDE[] = {{254, "row 0 is 254"},       {1.01f, "row 0 is 1.01"}, {-0.5f, "row 0 is -0.5"},
+                   {INFINITY, "row 0 is inf"}, {-1e30f, "scale by"}};
+    for (size_t i = 0; i < sizeof OUTSIDE / sizeof *OUTSIDE; ++i) {
+        const float outside[4] = {0.5f, OUTSIDE[i].value, 0.5f, 0.5f};
+        const skep_image wrong = {outside, 2, 2, 8, SKEP_FORMAT_GRAY + SKEP_FORMAT_FLOAT};
+        FAILS(skep_scene_add_view(handed_in, NULL, &wrong, camera, NULL), SKEP_ERR_ARGUMENT,
+              OUTSIDE[i].text);
+    }
 }
 
 static void check_cameras(skep_scene *handed_in, const skep_image *image, const skep_camera *good) {
@@ -260,6 +272,11 @@ static void check_changes(skep_scene *handed_in, const skep_image *image,
 
 static void check_questions(skep_scene *handed_in) {
     FAILS(skep_scene_validate(NULL), SKEP_ERR_NULL, "scene");
+    FAILS(skep_scene_copy(NULL, OUT(skep_scene *, 0)), SKEP_ERR_NULL, "scene");
+    FAILS(skep_scene_copy(handed_in, NULL), SKEP_ERR_NULL, "scene_out");
+    FAILS(skep_scene_get_warning(NULL, 0, OUT(char, 0), 9, OUT(size_t, 1)), SKEP_ERR_NULL, "scene");
+    FAILS(skep_scene_get_warning(handed_in, 99, OUT(char, 0), 9, OUT(size_t, 1)),
+          SKEP_ERR_ARGUMENT, "index is 99");
     FAILS(skep_scene_get_view_count(NULL, OUT(uint32_t, 0)), SKEP_ERR_NULL, "scene");
     FAILS(skep_scene_get_view_count(handed_in, NULL), SKEP_ERR_NULL, "count_out");
     FAILS(skep_scene_get_view(NULL, 0, OUT(uint32_t, 0), OUT(uint32_t, 1), OUT(skep_camera, 2)),

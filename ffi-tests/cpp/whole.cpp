@@ -106,6 +106,12 @@ void test_moves() {
     FAILS(SKEP_ERR_NULL, "scene", scene.view_count());
     FAILS(SKEP_ERR_NULL, "scene", skep::reconstruct(scene));
     scene = std::move(taken);
+    skep::Scene copied = MUST(scene.copy());
+    MUST(copied.set_depth_range(0, {1, 77}));
+    CHECK(MUST(copied.depth_range(0)).far_depth == 77 && MUST(scene.depth_range(0)).far_depth < 77);
+    CHECK(MUST(scene.warnings()).empty() && MUST(copied.warnings()).empty());
+    const skep::Scene empty = MUST(skep::Scene::create());
+    FAILS(SKEP_ERR_ARGUMENT, "views", empty.warnings());
     skep::Scene &itself = scene;
     scene = std::move(itself);
     CHECK(scene && !taken);

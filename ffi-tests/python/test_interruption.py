@@ -36,10 +36,15 @@ def test_progress_comes_in_the_callers_thread_and_grows(scene):
     assert all(progress.view < progress.view_count == len(scene) for progress in told)
 
 
-def test_a_true_answer_cancels(scene):
+def test_cancel_is_the_only_answer_that_cancels(scene):
     with pytest.raises(skep.Cancelled) as caught:
-        skep.reconstruct(scene, made.slow_options(), lambda progress: True)
+        skep.reconstruct(scene, made.slow_options(), lambda progress: skep.CANCEL)
     assert caught.value.status == skep.Cancelled.status
+    assert repr(skep.CANCEL) == "skep.CANCEL"
+    # What functions return that show progress, as tqdm's update, which returns True when it drew.
+    answers = iter([True, 1, "cancel", object()])
+    quick = skep.Options(schedule_scales=made.TWO_SCALES, threads=2)
+    assert len(skep.reconstruct(scene, quick, lambda progress: next(answers, True))) == len(scene)
 
 
 def test_an_exception_cancels_and_is_raised(scene):
@@ -56,7 +61,7 @@ def test_an_exception_cancels_and_is_raised(scene):
 def test_a_step_can_be_cancelled(scene):
     stepper = skep.Stepper(scene, made.slow_options())
     with pytest.raises(skep.Cancelled):
-        stepper.search(0, 0, progress=lambda progress: True)
+        stepper.search(0, 0, progress=lambda progress: skep.CANCEL)
 
 
 INTERRUPTED = """
@@ -133,7 +138,9 @@ def test_python_runs_on_while_the_library_works(scene):
 
     def work():
         try:
-            skep.reconstruct(scene, made.slow_options(), lambda progress: stop.is_set())
+            skep.reconstruct(
+                scene, made.slow_options(), lambda progress: skep.CANCEL if stop.is_set() else None
+            )
         except skep.Cancelled:
             pass
 

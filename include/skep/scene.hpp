@@ -24,6 +24,11 @@ class Scene : public detail::Handle<skep_scene, skep_scene_destroy> {
         Scene scene(nullptr);
         return detail::give(skep_scene_create(scene.put()), scene);
     }
+    /// Later changes of one scene do not affect the other; pictures are shared.
+    Fallible<Scene> copy() const {
+        Scene scene(nullptr);
+        return detail::give(skep_scene_copy(get(), scene.put()), scene);
+    }
     /// (0, 0) takes the depth ranges from the sparse points.
     static Fallible<Scene> read_colmap(const std::string &folder, DepthRange range = {}) {
         Scene scene(nullptr);
@@ -81,6 +86,20 @@ class Scene : public detail::Handle<skep_scene, skep_scene_destroy> {
                                                   view_counts.data(), views.data(), views.size()));
     }
     Fallible<void> validate() const { return detail::give(skep_scene_validate(get())); }
+    /// Warnings about the scene for its user, such as depth ranges that no sparse point supports.
+    Fallible<std::vector<std::string>> warnings() const {
+        std::vector<std::string> warnings;
+        // An invalid scene has none to list, and an error of its own.
+        detail::Status status(skep_scene_validate(get()));
+        if (!status)
+            return detail::give(std::move(status), warnings);
+        std::string warning;
+        while (detail::text(warning, [&](auto... out) {
+            return skep_scene_get_warning(get(), warnings.size(), out...);
+        }))
+            warnings.push_back(std::move(warning));
+        return detail::give(SKEP_OK, warnings);
+    }
     Fallible<std::uint32_t> view_count() const {
         std::uint32_t count = 0;
         return detail::give(skep_scene_get_view_count(get(), &count), count);

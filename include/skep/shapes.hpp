@@ -264,7 +264,7 @@ Status image_of(const Image &image, bool is_rgb, const char *name, skep_image &o
 enum class Order { Bgr, Rgb };
 
 /// A skep_image of a picture of the shape of cv::Mat, without a copy; colors are in OpenCV's order
-/// unless told otherwise.
+/// unless told otherwise. Floats are 0 to 1, 16 bits 0 to 65535: scale others, as with convertTo.
 template <class Image> Fallible<skep_image> image(const Image &picture, Order order = Order::Bgr) {
     skep_image out = {};
     detail::Status status = detail::image_of(picture, order == Order::Rgb, "picture", out);

@@ -17,10 +17,15 @@ pub const SKEP_FORMAT_BGR: u32 = 2;
 pub const SKEP_FORMAT_RGBA: u32 = 3;
 /// Blue, green, red, and a fourth channel that is ignored.
 pub const SKEP_FORMAT_BGRA: u32 = 4;
-/// Added to a layout: channels of uint16_t in the machine's byte order, 0 to 65535.
+/// Added to a layout: channels of uint16_t in the machine's byte order, 0 to 65535. Scale samples of fewer
+/// bits to that range, or most of the gray values are lost: 12 bits, 0 to 4095, by 65535 / 4095.
 pub const SKEP_FORMAT_16: u32 = 16;
-/// Added to a layout: channels of float, 0 to 1; values outside are clamped, NaN is refused.
+/// Added to a layout: channels of float, 0 (black) to 1 (white). Values up to 1/255 outside, as interpolation
+/// leaves them, are clamped; others and NaN are refused, so scale pixels of 0 to 255 by 1/255.
 pub const SKEP_FORMAT_FLOAT: u32 = 32;
+
+/// How far floats may lie outside 0 to 1, in which they are clamped: a step of 8 bits.
+const FLOAT_TOLERANCE: f32 = 1.0 / 255.0;
 
 /// Pixels in the caller's memory, read during the call only. The layout of this struct is frozen.
 #[repr(C)]
@@ -60,17 +65,21 @@ impl Depth {
         }
     }
 
-    /// A channel's value, rounded to 8 bits; `None` for what is not a number.
-    fn read(self, bytes: &[u8]) -> Option<u8> {
+    /// A channel's value, rounded to 8 bits; a float that is no gray value as the error.
+    fn read(self, bytes: &[u8]) -> Result<u8, f32> {
         match self {
-            Depth::Byte => Some(bytes[0]),
+            Depth::Byte => Ok(bytes[0]),
             Depth::Short => {
                 let value = u16::from_ne_bytes([bytes[0], bytes[1]]);
-                Some(((u32::from(value) + 128) / 257) as u8)
+                Ok(((u32::from(value) + 128) / 257) as u8)
             }
             Depth::Float => {
                 let value = f32::from_ne_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
-                (!value.is_nan()).then(|| (value.clamp(0.0, 1.0) * 255.0).round() as u8)
+                // NaN is in no range.
+                match (-FLOAT_TOLERANCE..=1.0 + FLOAT_TOLERANCE).contains(&value) {
+                    true => Ok((value.clamp(0.0, 1.0) * 255.0).round() as u8),
+                    false => Err(value),
+                }
             }
         }
     }
@@ -184,9 +193,10 @@ impl skep_image {
             bytes.chunks_exact(pixel_bytes).enumerate().map(move |(column, pixel)| (column, row, pixel))
         });
         let channel = |(column, row, pixel): (usize, usize, &[u8]), channel: usize| {
-            depth.read(&pixel[channel * depth.bytes()..]).ok_or_else(|| {
+            depth.read(&pixel[channel * depth.bytes()..]).map_err(|value| {
                 let name = format!("{name}.data at column {column}, row {row}");
-                Failure::argument(&name, "not a number", "numbers from 0 to 1")
+                let expected = "floats from 0 (black) to 1 (white): scale by 1 / the value of white";
+                Failure::argument(&name, value, expected)
             })
         };
         let (width, height) = (self.width, self.height);
@@ -202,5 +212,46 @@ impl skep_image {
                 Picture::from_rgb(width, height, color?)?
             }
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::status::{SKEP_ERR_ARGUMENT, guard, skep_last_error};
+    use super::*;
+    use std::ffi::CStr;
+
+    fn float(value: f32) -> Result<u8, f32> {
+        Depth::Float.read(&value.to_ne_bytes())
+    }
+
+    #[test]
+    fn floats_just_outside_0_to_1_are_clamped_and_others_refused() {
+        assert_eq!([float(0.0), float(0.5), float(1.0)], [Ok(0), Ok(128), Ok(255)]);
+        assert_eq!([float(-0.003), float(1.003)], [Ok(0), Ok(255)]);
+        for refused in [-0.005, 1.005, 254.0, f32::INFINITY, f32::NEG_INFINITY] {
+            assert_eq!(float(refused), Err(refused));
+        }
+        assert!(float(f32::NAN).is_err_and(f32::is_nan));
+    }
+
+    #[test]
+    fn a_float_that_is_refused_is_named_with_its_place() {
+        let pixels: [f32; 4] = [0.0, 0.5, 1.0, 200.0];
+        let image = skep_image {
+            data: pixels.as_ptr().cast(),
+            width: 2,
+            height: 2,
+            stride_bytes: 8,
+            format: SKEP_FORMAT_GRAY + SKEP_FORMAT_FLOAT,
+        };
+        // SAFETY: the fields describe `pixels`, which outlive the call.
+        assert_eq!(guard(|| unsafe { image.picture("image") }.map(drop)), SKEP_ERR_ARGUMENT);
+        let mut text = [0; 200];
+        // SAFETY: the buffer has room for as many bytes.
+        unsafe { skep_last_error(text.as_mut_ptr(), text.len()) };
+        // SAFETY: the text ends in NUL.
+        let text = unsafe { CStr::from_ptr(text.as_ptr()) }.to_str().unwrap();
+        assert!(text.contains("image.data at column 1, row 1 is 200"), "{text}");
     }
 }

@@ -80,6 +80,24 @@ pub unsafe extern "C" fn skep_scene_create(scene_out: *mut *mut skep_scene) -> s
     })
 }
 
+/// Copies a scene: later changes of one do not affect the other. Images are shared, not copied.
+///
+/// @param scene      The scene.
+/// @param scene_out  Receives the copy; destroy it with skep_scene_destroy.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_scene_copy(
+    scene: *const skep_scene,
+    scene_out: *mut *mut skep_scene,
+) -> skep_status {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        let (scene, out) = unsafe { (get(scene, "scene")?, out(scene_out, "scene_out")?) };
+        let state = pointers::read(&scene.inner)?.clone();
+        out.give(skep_scene { inner: RwLock::new(state) });
+        Ok(())
+    })
+}
+
 /// Destroys a scene. Results, steppers and clouds created from it are not affected.
 ///
 /// @param scene  The scene; NULL is ignored.

@@ -112,6 +112,36 @@ pub unsafe extern "C" fn skep_scene_get_depth_range(
     })
 }
 
+/// Copies one of the warnings about a scene, such as that a view saw no sparse point and where its depth
+/// range comes from. Those about source views depend on the options: skep_result_get_warning gives them.
+///
+/// @param scene       The scene.
+/// @param index       Index of the warning, from 0.
+/// @param buffer      Receives up to `capacity` bytes, the last one NUL; may be NULL to ask for the size.
+/// @param capacity    Bytes of room in `buffer`; a longer text is cut.
+/// @param needed_out  Receives the bytes of the whole text with its NUL; may be NULL.
+/// @retval SKEP_ERR_ARGUMENT  `index` is not below the number of warnings: all have been listed; or a scene
+///                            that skep_scene_validate refuses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn skep_scene_get_warning(
+    scene: *const skep_scene,
+    index: usize,
+    buffer: *mut c_char,
+    capacity: usize,
+    needed_out: *mut usize,
+) -> skep_status {
+    guard(|| {
+        // SAFETY: as the header demands of the caller.
+        let scene = unsafe { get(scene, "scene") }?.checked()?;
+        let warnings = scene.warnings();
+        let warning = warnings.get(index).ok_or_else(|| {
+            Failure::argument("index", index, format!("below the number of warnings, {}", warnings.len()))
+        })?;
+        // SAFETY: as the header demands of the caller.
+        unsafe { give_text(warning, buffer, capacity, needed_out) }
+    })
+}
+
 /// Gets the source views that a run with these options matches a view with. Of more than 1,000 views only
 /// those that share sparse points and the 256 whose cameras are the nearest are considered for each.
 ///

@@ -11,7 +11,8 @@ use std::ops::Deref;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// The inside of a scene object. Views and points are in one place only: a check moves them, and so does a
-/// change after it, unless a run still uses them.
+/// change after it, unless a run or a copy still uses them.
+#[derive(Clone)]
 pub(super) enum SceneState {
     /// Changed since the last check.
     Changed(Vec<View>, Vec<SparsePoint>),

@@ -6,7 +6,8 @@ From calibrated photographs to depth, normal and source-view maps and a fused po
     for photograph, (K, R, t) in zip(photographs, cameras):
         scene.add_view(photograph, skep.Camera(K, R, t), depth_range=(2.0, 6.0))
     result = skep.reconstruct(scene, progress=lambda progress: print(f"{progress.done:.0%}"))
-    depth, points = result[0].depth, result.cloud.positions
+    depth, points = result[0].validated_depth, result.cloud.positions
+    why_empty = result[0].status  # of every pixel a PixelStatus; result[0].depth is the raw estimate
 
 There are four levels, which can be mixed: whole runs (`reconstruct`), runs in a folder that may be larger
 than memory and go on after an interruption (`Job`; on a cluster of Dask `skep.distributed`), the stages of a
@@ -20,7 +21,16 @@ thread.
 
 from ._camera import Camera
 from ._cloud import Cloud, FusionView, fuse
-from ._errors import ArgumentError, Cancelled, CapacityError, Error, FileError, InternalError, PoisonedError
+from ._errors import (
+    ArgumentError,
+    Cancelled,
+    CapacityError,
+    Error,
+    FileError,
+    InternalError,
+    NotEnoughMemoryError,
+    PoisonedError,
+)
 from ._files import (
     read_consistency_graph,
     read_depth_map,
@@ -35,7 +45,7 @@ from ._native import ffi as _ffi, lib as _lib
 from ._options import Options
 from ._pycolmap import from_pycolmap
 from ._result import CycleRecord, PixelStatus, Result, ResultView, Statistics, reconstruct
-from ._run import Phase, Progress
+from ._run import CANCEL, Phase, Progress
 from ._scene import Scene
 from ._stepper import Candidates, Cycle, Estimate, EstimateInfo, EstimateMaps, Stepper
 
@@ -51,6 +61,7 @@ def simd_level_name() -> str:
 
 
 __all__ = [
+    "CANCEL",
     "ArgumentError",
     "Camera",
     "Cancelled",

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import os
-from collections.abc import Callable, Iterable
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._errors import ArgumentError, check
 from ._native import ffi
+
+T = TypeVar("T")
 
 _C_TYPES = {"u1": "uint8_t", "u2": "uint16_t", "u4": "uint32_t", "f4": "float", "f8": "double"}
 
@@ -102,6 +105,15 @@ def take_indices(call: Callable[[Any, int, Any], int]) -> tuple[int, ...]:
     found = ffi.new("uint32_t[]", count[0])
     check(call(found, count[0], count))
     return tuple(found)
+
+
+def until_refused(item: Callable[[int], T]) -> Iterator[T]:
+    """The items with the numbers 0, 1, ..., as many as there are."""
+    for number in itertools.count():
+        try:
+            yield item(number)
+        except ArgumentError:
+            return
 
 
 class _Borrowed:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -17,12 +18,15 @@ from ._camera import Camera
 from ._errors import ArgumentError, check
 from ._images import Order, image as to_image
 from ._native import ffi, lib
+from ._objects import SentAsArrays
 from ._options import Options
 from ._run import ProgressFunction, run
 
 
-class Cloud:
+class Cloud(SentAsArrays):
     """Fused points; `len(cloud)` is their number. Arrays are copied when they are first asked for."""
+
+    _sent = ("_count", "_view_total", "positions", "normals", "colors", "_lists")
 
     def __init__(self, handle: Any) -> None:
         self._handle = handle
@@ -77,9 +81,24 @@ class Cloud:
         """
         return self._lists[1]
 
+    def to_open3d(self) -> Any:
+        """An `open3d.geometry.PointCloud` of the points with their normals and colors, which are copied;
+        needs open3d (`pip install skep[open3d]`).
+        """
+        try:
+            open3d = importlib.import_module("open3d")
+        except ImportError as error:
+            text = f"to_open3d needs open3d, which cannot be imported: {error}; pip install open3d brings it"
+            raise ImportError(text) from error
+        vectors = open3d.utility.Vector3dVector
+        points = open3d.geometry.PointCloud(vectors(self.positions))
+        points.normals = vectors(self.normals.astype(np.float64))
+        points.colors = vectors(self.colors / 255.0)
+        return points
+
     def write_ply(self, file: str | os.PathLike[str]) -> None:
         """Writes a binary PLY, and the views of each point beside it in FILE.vis, as COLMAP does."""
-        check(lib.skep_cloud_write_ply(self._handle, path(file, "file")))
+        check(lib.skep_cloud_write_ply(self._held("be written"), path(file, "file")))
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +118,8 @@ class FusionView:
     """Of the image's channels."""
     confidence: NDArray[Any] | None = None
     """float32, (height, width), 0 to 1; None is 1 everywhere."""
+    white: float | None = None
+    """The value of white in the image, as in `Scene.add_view`."""
 
     def fill(self, struct: Any, number: int, view_count: int) -> list[Any]:
         """Writes the view into C's struct; returns the objects that must live as long as it is used."""
@@ -111,7 +132,7 @@ class FusionView:
         others = (view for view in range(view_count) if view != number)
         overlap = indices(others if self.overlap is None else self.overlap, f"{name}.overlap")
         camera = self.camera.to_c()
-        image = None if self.image is None else to_image(self.image, self.order)
+        image = None if self.image is None else to_image(self.image, self.order, self.white, stacklevel=4)
         struct.camera = camera
         struct.height, struct.width = shape
         struct.depth, struct.depth_stride_bytes = depth.pointer, depth.stride
@@ -131,7 +152,9 @@ def fuse(
 ) -> Cloud:
     """Fuses maps into points, with the "fusion." options and "threads"; `progress` as in `reconstruct`."""
     structs = ffi.new("skep_fusion_view[]", len(views))
-    alive = [view.fill(structs[number], number, len(views)) for number, view in enumerate(views)]
+    alive = []
+    for number, view in enumerate(views):
+        alive.append(view.fill(structs[number], number, len(views)))
     chosen = _options.handle(options)
 
     def call(*hook: Any) -> int:

@@ -11,6 +11,7 @@ from . import _options
 from ._buffers import path
 from ._errors import check
 from ._native import ffi, lib
+from ._objects import NotPickled
 from ._options import Options
 from ._run import ProgressFunction, run, run_plain
 
@@ -44,7 +45,7 @@ class JobNeeds:
     """CPU seconds of all threads together, within a factor of about two."""
 
 
-class Job:
+class Job(NotPickled):
     """A run in a folder.
 
         job = skep.Job.plan("SCENE", "SCENE/dense", skep.Options("fast"))
@@ -54,8 +55,15 @@ class Job:
     several processes at the same time.
     """
 
+    _instead = "send its folder, and open it there with Job.open"
+
     def __init__(self, handle: Any) -> None:
         self._handle = handle
+
+    def __repr__(self) -> str:
+        if self._handle is None:
+            return "<skep.Job, closed>"
+        return f"<skep.Job of {self.view_count} views, {self.cycle_count} cycles at most>"
 
     @staticmethod
     def plan(

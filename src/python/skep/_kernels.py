@@ -13,6 +13,7 @@ from ._camera import Camera
 from ._errors import ArgumentError, check
 from ._images import Order, image as to_image
 from ._native import ffi, lib
+from ._objects import Immutable, NotPickled
 
 
 def plane_through(camera: Camera, x: float, y: float, depth: float, normal: ArrayLike) -> NDArray[np.float64]:
@@ -38,21 +39,25 @@ def plane_homographies(reference: Camera, source: Camera, planes: ArrayLike) -> 
     return homographies
 
 
-class PackedImage:
-    """An image, copied into the layout the kernels sample. Never changes."""
+class PackedImage(Immutable, NotPickled):
+    """An image, copied into the layout the kernels sample. Never changes.
+
+    The arguments are those of `Scene.add_view`.
+    """
 
     __slots__ = ("_handle",)
 
     _handle: Any
+    _instead = "send the image, and pack it there"
 
-    def __init__(self, image: NDArray[Any], order: Order = "rgb") -> None:
-        given = to_image(image, order)
+    def __init__(self, image: NDArray[Any], order: Order = "rgb", white: float | None = None) -> None:
+        given = to_image(image, order, white)
         out = ffi.new("skep_packed_image **")
         check(lib.skep_packed_image_create(given.struct, out))
         self._handle = ffi.gc(out[0], lib.skep_packed_image_destroy)
 
 
-class NccWindow:
+class NccWindow(Immutable, NotPickled):
     """A square window of half side `radius`, sampled every `step` pixels. Never changes.
 
     A sample weighs exp(-r^2 / (2 sigma_spatial^2) - dI^2 / (2 sigma_color^2)), r pixels and dI of gray from
@@ -63,6 +68,7 @@ class NccWindow:
     __slots__ = ("_handle",)
 
     _handle: Any
+    _instead = "send its arguments, and make it there"
 
     def __init__(
         self,

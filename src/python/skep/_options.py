@@ -292,8 +292,22 @@ class Options(Mapping[str, Value]):
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *(name for name in _BY_ANY_NAME if name.isidentifier())]
 
+    def __reduce__(self) -> tuple[Callable[..., Options], tuple[dict[str, Value]]]:
+        return _from_values, (dict(self),)
+
     def __repr__(self) -> str:
-        return f"Options({dict(self)})"
+        usual = Options()
+        changed = {name: value for name, value in self.items() if value != usual[name]}
+        texts = (f"{name.replace('.', '_')}={value!r}" for name, value in changed.items())
+        return f"Options({', '.join(texts)})"
+
+
+def _from_values(values: dict[str, Value]) -> Options:
+    """Options of these values: what a copy or a pickle holds."""
+    options = Options()
+    for name, value in values.items():
+        options[name] = value
+    return options
 
 
 def _switch(value: str) -> bool:

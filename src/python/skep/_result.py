@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-import itertools
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _options
-from ._buffers import borrow, index, path, pointer, take_indices, take_text
+from ._buffers import borrow, index, path, pointer, take_indices, take_text, until_refused
 from ._cloud import Cloud
 from ._errors import ArgumentError, check
 from ._native import ffi, lib
+from ._objects import SentAsArrays
 from ._options import Options
 from ._run import ProgressFunction, run
 from ._scene import Scene
-
-T = TypeVar("T")
 
 
 class PixelStatus(IntEnum):
@@ -75,12 +73,33 @@ class CycleRecord:
     the source views' own depths lie."""
 
 
-class ResultView:
+class ResultView(SentAsArrays):
     """The maps of one view.
 
+    Most programs want `validated_depth` and `validated_normal`: `depth` and `normal` hold the raw estimate of
+    every pixel, right or wrong. `status` says of each pixel why it is not validated, and
+    `statistics.status_counts` how many there are of each kind.
+
     Raw maps are read-only arrays of the result's own memory, which lives as long as they do; the others are
-    copies, made at the first access.
+    copies, made at the first access. A view that was pickled holds copies of all. All are numpy arrays, which
+    other libraries take without a copy: `torch.from_dlpack(view.validated_depth)`; of raw maps some want a
+    copy, `view.depth.copy()`, as they are read-only.
     """
+
+    _sent = (
+        "view",
+        "size",
+        "depth",
+        "normal",
+        "cost",
+        "confidence",
+        "status",
+        "source_count",
+        "sources",
+        "statistics",
+        "cycles",
+        "_source_words",
+    )
 
     def __init__(self, handle: Any, view: int) -> None:
         self._handle = handle
@@ -106,7 +125,9 @@ class ResultView:
 
     @cached_property
     def depth(self) -> NDArray[np.float32]:
-        """The raw depth of every pixel in world units, 0 where there is no estimate; (height, width)."""
+        """The raw depth of every pixel in world units, right or wrong, 0 where there is no estimate; (height,
+        width). `validated_depth` leaves out what no source views confirm.
+        """
         return self._borrow(lib.skep_result_borrow_depth, "float", np.float32)
 
     @cached_property
@@ -128,18 +149,26 @@ class ResultView:
 
     @cached_property
     def status(self) -> NDArray[np.uint8]:
-        """Status of every pixel: values of `PixelStatus`."""
+        """Status of every pixel: values of `PixelStatus`, which say why a pixel has no validated depth.
+
+        share = {status.name: (view.status == status).mean() for status in skep.PixelStatus}
+        """
         return self._borrow(lib.skep_result_borrow_status, "uint8_t", np.uint8)
 
     @cached_property
     def validated_depth(self) -> NDArray[np.float32]:
-        """The depth of validated pixels, 0 elsewhere."""
-        return self._copy(lib.skep_result_get_depth, (lib.SKEP_MAPS_VALIDATED,), np.float32)
+        """The depth of validated pixels in world units, 0 elsewhere; `status` says why."""
+        return np.where(self._is_validated, self.depth, np.float32(0))
 
     @cached_property
     def validated_normal(self) -> NDArray[np.float32]:
         """The normals of validated pixels, zeros elsewhere."""
-        return self._copy(lib.skep_result_get_normal, (lib.SKEP_MAPS_VALIDATED,), np.float32, 3)
+        return np.where(self._is_validated[..., None], self.normal, np.float32(0))
+
+    @property
+    def _is_validated(self) -> NDArray[np.bool_]:
+        validated: NDArray[np.bool_] = self.status == PixelStatus.VALIDATED
+        return validated
 
     @cached_property
     def source_count(self) -> NDArray[np.uint16]:
@@ -156,9 +185,15 @@ class ResultView:
         if source not in self.sources:
             raise ArgumentError(f"source is {source}: must be one of {self.sources}")
         word, bit = divmod(self.sources.index(source), 32)
-        words = self._copy(lib.skep_result_get_source_bits, (word,), np.uint32)
+        words = self._source_words[word]
         visible: NDArray[np.bool_] = (words >> np.uint32(bit)) & np.uint32(1) != 0
         return visible
+
+    @cached_property
+    def _source_words(self) -> list[NDArray[np.uint32]]:
+        """A bit of every pixel for each of `sources`, 32 of them in each map."""
+        words = range((len(self.sources) + 31) // 32)
+        return [self._copy(lib.skep_result_get_source_bits, (word,), np.uint32) for word in words]
 
     @cached_property
     def statistics(self) -> Statistics:
@@ -176,15 +211,15 @@ class ResultView:
         found = ffi.new("skep_cycle_record[]", count[0])
         check(lib.skep_result_get_cycles(self._handle, self.view, found, count[0], count))
         return tuple(
-            CycleRecord(
-                one.downscale, one.cycle, one.pixels, one.changed, one.validated, one.median_residual
-            )
+            CycleRecord(one.downscale, one.cycle, one.pixels, one.changed, one.validated, one.median_residual)
             for one in found
         )
 
 
-class Result:
+class Result(SentAsArrays):
     """Result of a whole run: `result[view]` holds the maps of a view, `len(result)` counts the views."""
+
+    _sent = ("views", "cloud", "warnings")
 
     def __init__(self, handle: Any) -> None:
         self._handle = handle
@@ -218,22 +253,18 @@ class Result:
         """Warnings of the run for its user, such as views without any source view."""
         ask = lib.skep_result_get_warning
         warning = lambda number: take_text(lambda *out: ask(self._handle, number, *out))
-        return tuple(_until_refused(warning))
+        return tuple(until_refused(warning))
+
+    def to_open3d(self) -> Any:
+        """The fused points for open3d, as `Cloud.to_open3d` makes them."""
+        return self.cloud.to_open3d()
 
     def write_workspace(self, scene: Scene, folder: str | os.PathLike[str]) -> None:
         """Writes COLMAP's dense folder without images/ and sparse/, which `Scene.write_colmap`
         writes.
         """
-        check(lib.skep_result_write_workspace(self._handle, scene._handle, path(folder, "folder")))
-
-
-def _until_refused(item: Callable[[int], T]) -> Iterator[T]:
-    """The items with the numbers 0, 1, ..., as many as there are."""
-    for number in itertools.count():
-        try:
-            yield item(number)
-        except ArgumentError:
-            return
+        held = self._held("be written")
+        check(lib.skep_result_write_workspace(held, scene._handle, path(folder, "folder")))
 
 
 def reconstruct(
@@ -241,8 +272,9 @@ def reconstruct(
 ) -> Result:
     """Estimates depth, normal and source views of every pixel of every view, and fuses the validated pixels.
 
-    `progress` is called in this thread; a true answer cancels the run, which raises `Cancelled`. An
-    exception, as is KeyboardInterrupt, cancels it too.
+    `progress` is called in this thread about a hundred times a second. The run is cancelled when it returns
+    `CANCEL`, and raises `Cancelled`, or when it raises an exception, as KeyboardInterrupt, which the run
+    raises too. Any other result is ignored, so `tqdm.update` may be called in it as it is.
     """
     chosen = _options.handle(options)
     call = lambda *hook: lib.skep_reconstruct(scene._handle, chosen, *hook)

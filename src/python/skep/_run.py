@@ -11,8 +11,8 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import IntEnum
-from typing import Any
+from enum import Enum, IntEnum
+from typing import Any, Final
 
 from ._errors import check
 from ._native import ffi, lib
@@ -43,9 +43,21 @@ class Progress:
     view_count: int
 
 
+class Cancel(Enum):
+    """The type of `CANCEL`, which a progress function returns to cancel the call."""
+
+    CANCEL = "cancel"
+
+    def __repr__(self) -> str:
+        return "skep.CANCEL"
+
+
+CANCEL: Final = Cancel.CANCEL
+
 ProgressFunction = Callable[[Progress], object]
-"""Called in the thread that made the call, with the latest progress. A true result cancels the call, which
-then raises `Cancelled`; an exception cancels it too, and is raised by the call."""
+"""Called in the thread that made the call, with the latest progress. The call is cancelled when it returns
+`CANCEL`, and then raises `Cancelled`, or when it raises an exception, which the call raises too. Any other
+result is ignored, also a true one: functions that show progress may return what they like."""
 
 
 class _Call:
@@ -97,7 +109,7 @@ class _Call:
                 progress, self.latest = self.latest, None
             if progress is None:
                 return
-            if function(progress):
+            if function(progress) is CANCEL:
                 self.cancelled = True
 
 
@@ -108,7 +120,7 @@ def run(call: Callable[..., int], kind: str, progress: ProgressFunction | None) 
     under_way = _Call(call, kind)
     try:
         under_way.thread.start()
-        under_way.report(progress or (lambda _: False))
+        under_way.report(progress or (lambda _: None))
     except BaseException:
         under_way.cancelled = True
         raise

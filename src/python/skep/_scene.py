@@ -10,23 +10,37 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _options
-from ._buffers import doubles, index, indices, path, pointer, rows, take_indices, take_text, text
+from ._buffers import (
+    doubles,
+    index,
+    indices,
+    path,
+    pointer,
+    rows,
+    take_indices,
+    take_text,
+    text,
+    until_refused,
+)
 from ._camera import Camera
 from ._errors import ArgumentError, check
 from ._images import Order, image as to_image
 from ._native import ffi, lib
+from ._objects import NotPickled
 from ._options import Options
 
 
-class Scene:
+class Scene(NotPickled):
     """Calibrated photographs and sparse points; `len(scene)` is the number of views.
 
-    A run uses the scene as it was when the run started.
+    A run uses the scene as it was when the run started. A copy by `copy.copy` shares the photographs, and
+    changes by itself.
     """
 
     __slots__ = ("_handle",)
 
     _handle: Any
+    _instead = "send the arguments of add_view, or a folder of write_colmap for read_colmap"
 
     def __init__(self) -> None:
         out = ffi.new("skep_scene **")
@@ -44,9 +58,21 @@ class Scene:
         near, far = depth_range or (0.0, 0.0)
         out = ffi.new("skep_scene **")
         check(lib.skep_scene_read_colmap(path(folder, "folder"), near, far, out))
+        return cls._of(out)
+
+    @classmethod
+    def _of(cls, out: Any) -> Scene:
         scene = cls.__new__(cls)
         scene._handle = ffi.gc(out[0], lib.skep_scene_destroy)
         return scene
+
+    def __copy__(self) -> Scene:
+        out = ffi.new("skep_scene **")
+        check(lib.skep_scene_copy(self._handle, out))
+        return self._of(out)
+
+    def __deepcopy__(self, _: Any) -> Scene:
+        return self.__copy__()
 
     def write_colmap(self, folder: str | os.PathLike[str]) -> None:
         """Writes a folder that COLMAP and `read_colmap` read; photographs are PNG files whatever their names."""
@@ -59,15 +85,21 @@ class Scene:
         *,
         name: str | None = None,
         order: Order = "rgb",
+        white: float | None = None,
         mask: NDArray[Any] | None = None,
         depth_range: tuple[float, float] | None = None,
     ) -> int:
         """Adds a photograph, which is copied, and returns its number.
 
-        `image` has shape (height, width) or (height, width, 1, 3 or 4) and type uint8, uint16, or float32
-        from 0 to 1; `order` is that of its channels. Rows may lie apart, as in a part of a larger image.
+        `image` has shape (height, width) or (height, width, 1, 3 or 4) and type uint8, uint16 or float32;
+        `order` is that of its channels. Rows may lie apart, as in a part of a larger image.
+
+        `white` is the value of white: None takes 255 for uint8, 65535 for uint16 and 1 for float32. Pass 255
+        for float32 from 0 to 255, and 4095 for 12 bits in uint16. Values outside 0 to `white` are refused,
+        except for those by up to 1/255 of it, which are clamped. An image of uint16 without any value above
+        4095 is a warning unless `white` is given.
         """
-        given = to_image(image, order)
+        given = to_image(image, order, white)
         # An added view cannot be removed: everything that can fail is checked before.
         if mask is not None:
             _mask_rows(mask, given.array.shape[:2])
@@ -130,6 +162,16 @@ class Scene:
     def validate(self) -> None:
         """Checks the scene as a run would."""
         check(lib.skep_scene_validate(self._handle))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings about the scene for its user, such as depth ranges that no sparse point supports. Those
+        about source views, which depend on the options, are in `Result.warnings`.
+        """
+        self.validate()
+        ask = lib.skep_scene_get_warning
+        warning = lambda number: take_text(lambda *out: ask(self._handle, number, *out))
+        return tuple(until_refused(warning))
 
     def __len__(self) -> int:
         count = ffi.new("uint32_t *")

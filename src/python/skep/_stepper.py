@@ -13,6 +13,7 @@ from . import _options
 from ._buffers import index, pointer, rows, take_indices
 from ._errors import check
 from ._native import ffi, lib
+from ._objects import Immutable, NotPickled
 from ._options import Options
 from ._result import ResultView
 from ._run import ProgressFunction, run
@@ -64,10 +65,12 @@ class EstimateMaps:
     """Where the check validated the plane."""
 
 
-class Estimate:
+class Estimate(Immutable, NotPickled):
     """The maps of one view after `Stepper.search` or `Stepper.check`. Never changes."""
 
     __slots__ = ("_handle", "size")
+
+    _instead = "send estimate.save(), for Estimate.load with a stepper of the same scene and options"
 
     def __init__(self, handle: Any, size: tuple[int, int]) -> None:
         self._handle = handle
@@ -136,6 +139,11 @@ class Estimate:
             found.ncc_evaluations,
         )
 
+    def __repr__(self) -> str:
+        info, (width, height) = self.info, self.size
+        stage = "checked" if info.is_checked else "searched"
+        return f"<skep.Estimate of view {info.view}, {stage} in cycle {info.cycle}, {width} x {height}>"
+
     def maps(self) -> EstimateMaps:
         """Copies of all maps."""
         shape = self.size[::-1]
@@ -146,16 +154,18 @@ class Estimate:
         return EstimateMaps(depth, normal, cost, validated.view(np.bool_))
 
 
-class Candidates:
+class Candidates(Immutable, NotPickled):
     """Planes of other views, transferred to the pixels of a view. Never changes."""
 
     __slots__ = ("_handle",)
+
+    _instead = "send the estimates with Estimate.save, and call Stepper.propagate there"
 
     def __init__(self, handle: Any) -> None:
         self._handle = handle
 
 
-class Stepper:
+class Stepper(Immutable, NotPickled):
     """The stages of a run on single views; `len(stepper)` is the largest number of cycles.
 
     For cycle 0, and then for the cycle that `next` returns until that is None:
@@ -169,6 +179,8 @@ class Stepper:
     """
 
     __slots__ = ("_handle", "view_count", "_cycles")
+
+    _instead = "send its scene and options, and make a stepper of them there"
 
     def __init__(self, scene: Scene, options: Options | None = None) -> None:
         out = ffi.new("skep_stepper **")
@@ -199,6 +211,9 @@ class Stepper:
 
     def __getitem__(self, cycle: int) -> Cycle:
         return self._cycles[cycle]
+
+    def __repr__(self) -> str:
+        return f"<skep.Stepper of {self.view_count} views, {len(self)} cycles at most>"
 
     def size(self, cycle: int, view: int) -> tuple[int, int]:
         """Width and height of a view's maps in a cycle."""

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 from ._errors import Cancelled, FileError
 from ._job import Job, Task
 from ._options import Options
+from ._run import CANCEL
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -226,7 +227,8 @@ class _Opened:
         with self.busy:
             if self.stopped:
                 raise Cancelled("the run was stopped")
-            self.job.run_task(task, cycle=cycle, view=view, progress=lambda _: self.stopped)
+            progress = lambda _: CANCEL if self.stopped else None
+            self.job.run_task(task, cycle=cycle, view=view, progress=progress)
 
 
 _opened: dict[str, _Opened] = {}
