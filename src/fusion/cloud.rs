@@ -49,6 +49,9 @@ impl PointCloud {
     }
 }
 
+/// Takes points as they are made.
+pub(crate) type Emit<'a> = &'a mut dyn FnMut(&PointCloud) -> Result<()>;
+
 /// Points that are read in parts, as often as it takes.
 pub(crate) trait CloudSource {
     /// Number of points.

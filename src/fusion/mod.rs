@@ -20,7 +20,7 @@ use crate::options::FusionOptions;
 use crate::parallel::{Phase, Progress, ProgressFn};
 use crate::scene::{Maps, PixelStatus};
 use average::{Member, average};
-pub(crate) use cloud::CloudSource;
+pub(crate) use cloud::{CloudSource, Emit};
 pub use cloud::{PointCloud, PointViews};
 use glam::{DVec2, DVec3};
 pub use overlap::overlaps;

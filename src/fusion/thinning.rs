@@ -2,7 +2,7 @@
 //!
 //! Both read the points in their order and do not depend on the number of threads.
 
-use super::cloud::{CloudSource, PointCloud};
+use super::cloud::{CloudSource, Emit, PointCloud};
 use crate::error::Result;
 use crate::options::FusionOptions;
 use glam::DVec3;
@@ -32,7 +32,7 @@ struct Voxel {
 
 /// Thins a cloud in memory as the options say.
 pub(super) fn thin(mut cloud: PointCloud, options: &FusionOptions) -> Result<PointCloud> {
-    let collect = |thin: &dyn Fn(&mut dyn FnMut(&PointCloud) -> Result<()>) -> Result<()>| {
+    let collect = |thin: &dyn Fn(Emit) -> Result<()>| {
         let mut result = PointCloud::default();
         thin(&mut |points| {
             result.append(points);

@@ -1,7 +1,7 @@
 //! A cloud on its way into files: fused and thinned on disk, and written.
 
 use crate::error::{Error, Result};
-use crate::fusion::{CloudSource, FusionInput, PointCloud, draw, fuse_input, thin_by_voxels};
+use crate::fusion::{CloudSource, Emit, FusionInput, PointCloud, draw, fuse_input, thin_by_voxels};
 use crate::io::{CloudSpool, ModelImage, StoredCloud, visibility_path, write_cloud, write_splat};
 use crate::options::{Options, OutputOptions};
 use crate::parallel::{Phase, Progress, ProgressFn};
@@ -62,10 +62,7 @@ pub(super) fn make<'a>(
 }
 
 /// The points that `thin` adds.
-fn respooled(
-    path: &Path,
-    thin: &dyn Fn(&mut dyn FnMut(&PointCloud) -> Result<()>) -> Result<()>,
-) -> Result<StoredCloud> {
+fn respooled(path: &Path, thin: &dyn Fn(Emit) -> Result<()>) -> Result<StoredCloud> {
     let mut spool = CloudSpool::new(path)?;
     thin(&mut |points| spool.add(points))?;
     spool.finish()

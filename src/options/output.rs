@@ -109,7 +109,8 @@ pub struct ViewFiles {
 
 impl Default for ViewFiles {
     fn default() -> ViewFiles {
-        ViewFiles { status: false, graphs: false, ..ViewFiles::ALL }
+        let (status, graphs) = (false, false);
+        ViewFiles { depth: true, normals: true, confidence: true, status, graphs, previews: true }
     }
 }
 
@@ -167,7 +168,7 @@ impl std::str::FromStr for ViewFiles {
         let entries: Vec<&str> = text.split(',').map(str::trim).collect();
         let changes = |entry: &&str| entry.starts_with(['+', '-']);
         let is_change = entries.iter().any(changes);
-        if is_change && !entries.iter().all(|entry| changes(&entry)) {
+        if is_change && !entries.iter().all(changes) {
             return Err(error());
         }
         let mut switches = if is_change { ViewFiles::default().switches() } else { [false; 6] };

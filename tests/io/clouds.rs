@@ -63,7 +63,8 @@ fn las_and_laz_hold_positions_colors_and_normals() {
         assert_eq!((header.number_of_points(), header.version().minor), (1600, 4));
         assert_eq!(header.point_format().is_compressed, !name.ends_with("las"));
         assert!(header.transforms().x.scale <= 1e-3 / 8.0, "{:?}", header.transforms());
-        let points: Vec<las::Point> = reader.points().collect::<Result<_, _>>().unwrap();
+        let data = reader.read_all().unwrap();
+        let points: Vec<las::Point> = data.points().map(Result::unwrap).collect();
         for (index, point) in points.iter().enumerate() {
             let [x, y, z] = cloud.positions[index];
             let error = (point.x - x).abs().max((point.y - y).abs()).max((point.z - z).abs());

@@ -100,10 +100,13 @@ pub(super) fn check(path: &Path, scene: &mut SourceScene, convention: Convention
     Ok(())
 }
 
+/// What makes one pose of another.
+type ChangePose = fn(Pose) -> Pose;
+
 impl Convention {
     /// Its name; and those it is mistaken for, with what makes the pose that was meant of the one that was
     /// understood.
-    fn alternatives(self) -> (&'static str, [(&'static str, fn(Pose) -> Pose); 3]) {
+    fn alternatives(self) -> (&'static str, [(&'static str, ChangePose); 3]) {
         match self {
             Convention::WorldToCamera => (
                 "world-to-camera with y down and z forward",
@@ -256,7 +259,7 @@ mod tests {
 
     #[test]
     fn poses_in_another_convention_are_named() {
-        let given: [(fn(Pose) -> Pose, Convention, &str); 4] = [
+        let given: [(ChangePose, Convention, &str); 4] = [
             (inverse, Convention::WorldToCamera, "the poses look like camera-to-world; expected world-to"),
             (flipped, Convention::WorldToCamera, "look like world-to-camera with OpenGL's axes"),
             (flipped, Convention::CameraToWorldOpenGl, "look like camera-to-world with OpenCV's axes"),
