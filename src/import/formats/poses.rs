@@ -87,7 +87,7 @@ pub(super) fn check(path: &Path, scene: &mut SourceScene, convention: Convention
             return Err(Error::file(
                 path,
                 format!(
-                    "the poses look like {meaning}; expected {expected}: as they are, {} of the sparse points \
+                    "the poses look like {meaning}; expected {expected}: as given, {} of the sparse points \
                      project into the photographs that should show them, and {} if they are {meaning}",
                     percent(given),
                     percent(found)
