@@ -16,7 +16,10 @@ fn matrix(camera: &Camera) -> Value {
 fn content() -> Value {
     let ColmapModel { images, .. } = model();
     let camera = images[0].camera;
-    let frame = |ModelImage { name, camera }: &ModelImage| json!({"file_path": format!("./images/{name}"), "transform_matrix": matrix(camera)});
+    let frame = |ModelImage { name, camera }: &ModelImage| {
+        let path = format!("./images/{name}");
+        json!({"file_path": path, "transform_matrix": matrix(camera)})
+    };
     json!({
         "camera_model": "OPENCV", "fl_x": camera.fx, "fl_y": camera.fy, "cx": camera.cx + 0.5,
         "cy": camera.cy + 0.5, "w": 640, "h": 360, "k1": 0.0, "k2": 0.0, "p1": 0.0, "p2": 0,

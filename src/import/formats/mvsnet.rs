@@ -221,7 +221,7 @@ fn enlarge(files: &mut [CameraFile], warnings: &mut Vec<String>) {
     } else if let Some(file) = files.iter().find(|file| !is_central(&file.camera, 1.0)) {
         let Camera { cx, cy, width, height, .. } = file.camera;
         warnings.push(format!(
-            "{}: the principal point {cx}, {cy} is far from the middle of the photograph of {width}x{height}; \
+            "{}: the principal point {cx}, {cy} is far from the middle of the photograph, {width}x{height}; \
              is the calibration that of another size?",
             file.path.display()
         ));

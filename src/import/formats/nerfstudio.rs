@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 const NAME: &str = "transforms.json";
 
-/// Models whose parameters are those of [`Distortion::Brown`]; `PINHOLE` is what some writers call any of them.
+/// Models whose parameters are those of [`Distortion::Brown`]; some writers call any of them `PINHOLE`.
 const PERSPECTIVE: [&str; 6] =
     ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE", "SIMPLE_RADIAL", "RADIAL"];
 const FISHEYE: &str = "OPENCV_FISHEYE";

@@ -31,6 +31,9 @@ pub(super) enum Convention {
 /// A pose of the crate: world to camera.
 type Pose = (DMat3, DVec3);
 
+/// The name of a convention, and what makes the pose that was meant of the one that was understood.
+type Alternative = (&'static str, fn(Pose) -> Pose);
+
 /// The matrix of these rows.
 pub(super) fn from_rows(rows: [[f64; 3]; 3]) -> DMat3 {
     DMat3::from_cols_array_2d(&rows).transpose()
@@ -84,7 +87,7 @@ pub(super) fn check(path: &Path, scene: &mut SourceScene, convention: Convention
             return Err(Error::file(
                 path,
                 format!(
-                    "the poses look like {meaning}; expected {expected}: as they are, {} of the sparse points \
+                    "the poses look like {meaning}; expected {expected}: as given, {} of the sparse points \
                      project into the photographs that should show them, and {} if they are {meaning}",
                     percent(given),
                     percent(found)
@@ -100,13 +103,9 @@ pub(super) fn check(path: &Path, scene: &mut SourceScene, convention: Convention
     Ok(())
 }
 
-/// What makes one pose of another.
-type ChangePose = fn(Pose) -> Pose;
-
 impl Convention {
-    /// Its name; and those it is mistaken for, with what makes the pose that was meant of the one that was
-    /// understood.
-    fn alternatives(self) -> (&'static str, [(&'static str, ChangePose); 3]) {
+    /// Its name, and those it is mistaken for.
+    fn alternatives(self) -> (&'static str, [Alternative; 3]) {
         match self {
             Convention::WorldToCamera => (
                 "world-to-camera with y down and z forward",
@@ -206,12 +205,15 @@ mod tests {
     use crate::import::SourcePhotograph;
     use crate::testing::looking_at;
 
-    /// Cameras on an arc around points about the origin, each of which saw all of them.
+    /// Where the points are: around the origin some wrong poses would show them too.
+    const MIDDLE: DVec3 = DVec3::new(8.0, -3.0, 2.0);
+
+    /// Cameras on an arc around points, each of which saw all of them.
     fn scene(change: fn(Pose) -> Pose, has_tracks: bool) -> SourceScene {
         let photograph = |index: u32| {
             let angle = f64::from(index) * 0.3;
             let position = DVec3::new(5.0 * angle.sin(), 1.0 + 0.2 * angle, -5.0 * angle.cos());
-            let camera = looking_at(position, DVec3::ZERO, (64, 48), 50.0);
+            let camera = looking_at(MIDDLE + position, MIDDLE, (64, 48), 50.0);
             SourcePhotograph {
                 name: format!("{index}.png"),
                 path: format!("{index}.png").into(),
@@ -223,7 +225,7 @@ mod tests {
         };
         let point = |index: u32| {
             let angle = f64::from(index);
-            let position = DVec3::new(angle.sin(), 0.5 * (2.0 * angle).cos(), angle.cos());
+            let position = MIDDLE + DVec3::new(angle.sin(), 0.5 * (2.0 * angle).cos(), angle.cos());
             SparsePoint { position, views: if has_tracks { (0..5).collect() } else { Vec::new() } }
         };
         SourceScene {
@@ -259,7 +261,7 @@ mod tests {
 
     #[test]
     fn poses_in_another_convention_are_named() {
-        let given: [(ChangePose, Convention, &str); 4] = [
+        let given: [(fn(Pose) -> Pose, Convention, &str); 4] = [
             (inverse, Convention::WorldToCamera, "the poses look like camera-to-world; expected world-to"),
             (flipped, Convention::WorldToCamera, "look like world-to-camera with OpenGL's axes"),
             (flipped, Convention::CameraToWorldOpenGl, "look like camera-to-world with OpenCV's axes"),
