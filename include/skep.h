@@ -248,6 +248,29 @@ size_t skep_last_error(char *buffer, size_t capacity);
  *       depend on it.
  *       default: best
  *
+ * Input: what a run takes from a scene in files.
+ *   input.max_image_size
+ *       Largest side of the photographs of a scene in files: larger ones are reduced, and the maps have their
+ *       reduced size. 0 keeps all pixels.
+ *       whole number, 0 to 32768, pixels; default: 0
+ *   input.alpha_mask
+ *       Pixels of alpha 0 are ignored like masked ones.
+ *       switch, true or false; default: false
+ *   input.images
+ *       The photographs to take: names or patterns with * and ?, separated by commas, or the path of a text
+ *       file with one on each line; all if empty.
+ *       default:
+ *   input.masks
+ *       Folder of masks: NAME.png for the photograph NAME; where it is 0 nothing is estimated. None if empty.
+ *       default:
+ *   input.sources
+ *       File with the source views of each view, in the layout of COLMAP's patch-match.cfg; chosen by
+ *       triangulation angle if empty.
+ *       default:
+ *   input.bounds
+ *       Box of the world in which surfaces are reconstructed, x0 y0 z0 x1 y1 z1; everything if empty.
+ *       default:
+ *
  * Schedule: the scales of a run and the cycles on each.
  *   schedule.scales
  *       Scales from coarse to fine, each twice as large as the one before, the last at full size:

@@ -104,7 +104,8 @@ mod tests {
     use crate::testing;
 
     fn lens(distortion: Option<Distortion>) -> Lens {
-        Lens { camera: testing::camera(0.0, (640, 480)), distortion }
+        let own = testing::camera(0.0, (640, 480));
+        Lens { camera: Camera { fx: 600.0, fy: 600.0, cx: 319.5, cy: 239.5, ..own }, distortion }
     }
 
     #[test]

@@ -151,7 +151,8 @@ mod tests {
     use crate::testing;
 
     fn lens(distortion: Option<Distortion>) -> Lens {
-        Lens { camera: testing::camera(0.0, (96, 72)), distortion }
+        let own = testing::camera(0.0, (96, 72));
+        Lens { camera: Camera { fx: 90.0, fy: 90.0, cx: 47.5, cy: 35.5, ..own }, distortion }
     }
 
     /// A picture whose gray values are a linear function of the ideal rays, as a lens shows them.

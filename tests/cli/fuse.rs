@@ -131,8 +131,9 @@ fn what_cannot_be_fused_or_written_is_refused_and_leaves_nothing() {
         assert_eq!(super::files(folder.path()), before);
     };
     refused(&["--output", new, "--memory", "10MiB"], &["options.memory is 10.0 MiB", "at least"]);
-    let in_the_way = folder.path().join("images");
-    refused(&["--output", in_the_way.to_str().unwrap()], &["images", "a folder has this name"]);
+    let in_the_way = folder.path().join("cloud.ply");
+    fs::create_dir(&in_the_way).unwrap();
+    refused(&["--output", in_the_way.to_str().unwrap()], &["cloud.ply", "a folder has this name"]);
     fuse(&folder, &["--output", new]);
     assert!(folder.path().join("new/folder/cloud.ply.vis").is_file());
     fs::remove_dir_all(folder.path().join("new")).unwrap();

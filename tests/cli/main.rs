@@ -150,7 +150,7 @@ fn the_environment_forces_a_simd_level_lowered_to_the_machine_s() {
 fn help_names_files_and_remedies() {
     let output = skep(&["help", "reconstruct"]);
     assert!(output.status.success());
-    for word in ["fused.ply", "report.json", "preview/", "image_undistorter", "--depth-range", "Examples:"] {
+    for word in ["fused.ply", "report.json", "preview/", "transforms.json", "--depth-range", "Examples:"] {
         assert!(text(&output.stdout).contains(word), "help lacks {word}");
     }
 }

@@ -158,7 +158,7 @@ fn distortion_is_read_only_where_it_is_asked_for() {
     write(folder.path().join("images.txt"), IMAGES).unwrap();
     let (model, lenses) = ColmapModel::read_with_lenses(folder.path()).unwrap();
     assert_eq!(model.images, read_texts(CAMERAS, IMAGES, POINTS).unwrap().images);
-    assert_eq!(lenses, [Some(Distortion::brown(&[0.1], [0.0; 2])), None]);
+    assert_eq!(lenses, [None, Some(Distortion::brown(&[0.1], [0.0; 2]))]);
     let cameras = opencv("0.1");
     let parts = ["cameras.txt, line 3", "camera 3", "OPENCV", "PINHOLE", command];
     assert_refused(read_texts(&cameras, IMAGES, POINTS), &parts);
@@ -177,7 +177,7 @@ fn broken_text_is_refused_with_its_line() {
         ("3 PINHOLE 6 4", "3 PINHOLE 6 -4", "cameras.txt, line 3", "-4"),
         ("8 8.25", "NaN 8.25", "cameras.txt, line 3", "finite"),
         ("8 8.25", "8 0", "cameras.txt, line 3", "fy"),
-        ("3 2.25", "3", "cameras.txt, line 3", "ends before fx fy cx cy"),
+        ("3 2.25", "3", "cameras.txt, line 3", "ends before the camera's parameters"),
         ("3 2.25", "3 2.25 0.1", "cameras.txt, line 3", "0.1"),
         ("9 SIMPLE", "3 SIMPLE", "cameras.txt, line 4", "camera 3 occurs twice"),
         ("12 2 0 0 0", "12 0 0 0 0", "images.txt, line 2", "quaternion"),

@@ -366,6 +366,8 @@ const RECONSTRUCT_HELP: &str = "\
 The scene:
   images/              photographs: PNG, JPEG, TIFF, BMP, WebP, PNM; color or gray, 8 or 16 bits
   sparse/, sparse/0/   COLMAP model, text or binary, of any camera model
+  or a scene of another program, a folder or file: transforms.json (nerfstudio, instant-ngp), .mvs
+  (OpenMVS), cams/ and pair.txt (MVSNet, ACMM), reconstruction.json (OpenSfM), *_par.txt (Middlebury)
   Where lenses distort, or --max-image-size, --masks and the like ask for it, changed photographs,
   masks and their model are written into the folder of the results; the maps belong to those.
 

@@ -4,7 +4,7 @@
 use super::visibility::write_lists;
 use crate::error::Result;
 use crate::fusion::{CloudSource, PointCloud};
-use crate::io::files::{cannot_be_read, cannot_be_written, temporary_file};
+use crate::io::files::{NewFolders, cannot_be_read, cannot_be_written, temporary_file};
 use std::io::{self, BufReader, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
@@ -20,6 +20,8 @@ pub(crate) struct CloudSpool {
     points: BufWriter<NamedTempFile>,
     views: BufWriter<NamedTempFile>,
     count: usize,
+    /// After the files in them: what is dropped first is removed first.
+    folders: NewFolders,
 }
 
 impl CloudSpool {
@@ -28,12 +30,15 @@ impl CloudSpool {
     /// # Errors
     /// A folder in which no file can be made.
     pub(crate) fn new(path: &Path) -> Result<CloudSpool> {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new("."));
+        let folders = NewFolders::create(folder).map_err(|error| cannot_be_written(path, error))?;
         let temporary = || -> Result<BufWriter<NamedTempFile>> {
-            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-            let file = temporary_file(folder.unwrap_or(Path::new(".")));
+            let file = temporary_file(folder);
             Ok(BufWriter::new(file.map_err(|error| cannot_be_written(path, error))?))
         };
-        Ok(CloudSpool { path: path.to_owned(), points: temporary()?, views: temporary()?, count: 0 })
+        let (points, views) = (temporary()?, temporary()?);
+        Ok(CloudSpool { path: path.to_owned(), points, views, count: 0, folders })
     }
 
     /// Adds points.
@@ -56,7 +61,8 @@ impl CloudSpool {
             let file = file.into_inner().map_err(io::IntoInnerError::into_error);
             file.map_err(|error| cannot_be_written(&self.path, error))
         };
-        Ok(StoredCloud { points: whole(self.points)?, views: whole(self.views)?, count: self.count })
+        let (points, views) = (whole(self.points)?, whole(self.views)?);
+        Ok(StoredCloud { points, views, count: self.count, _folders: self.folders })
     }
 }
 
@@ -74,6 +80,8 @@ pub(crate) struct StoredCloud {
     points: NamedTempFile,
     views: NamedTempFile,
     count: usize,
+    /// After the files in them.
+    _folders: NewFolders,
 }
 
 impl CloudSource for StoredCloud {

@@ -65,6 +65,23 @@ class Options(Mapping[str, Value]):
     simd: str
     """Instruction set: scalar, baseline, v3, or best for the best the machine has; the result does not depend
     on it. (name; default: best)"""
+    input_max_image_size: int
+    """Largest side of the photographs of a scene in files: larger ones are reduced, and the maps have their
+    reduced size. 0 keeps all pixels. (whole number, 0 to 32768, pixels; default: 0)"""
+    input_alpha_mask: bool
+    """Pixels of alpha 0 are ignored like masked ones. (switch, true or false; default: false)"""
+    input_images: str
+    """The photographs to take: names or patterns with * and ?, separated by commas, or the path of a text
+    file with one on each line; all if empty. (text; default: )"""
+    input_masks: str
+    """Folder of masks: NAME.png for the photograph NAME; where it is 0 nothing is estimated. None if empty.
+    (path; default: )"""
+    input_sources: str
+    """File with the source views of each view, in the layout of COLMAP's patch-match.cfg; chosen by
+    triangulation angle if empty. (path; default: )"""
+    input_bounds: str
+    """Box of the world in which surfaces are reconstructed, x0 y0 z0 x1 y1 z1; everything if empty. (text;
+    default: )"""
     schedule_scales: str
     """Scales from coarse to fine, each twice as large as the one before, the last at full size: `downscale=2
     food_sources=3 iterations=5+4x1; downscale=1 food_sources=2 iterations=1+2x1` is half size with 3 food
