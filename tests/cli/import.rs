@@ -78,9 +78,9 @@ fn a_distorted_scene_is_undistorted_into_the_workspace_and_gives_nearly_the_same
         let Some((x, y)) = pinhole.nearest_pixel(there).filter(|_| depth > 0.0) else { continue };
         let found = straight.values[(y * straight.width + x) as usize];
         both += u32::from(found > 0.0);
-        same += u32::from(found > 0.0 && (f64::from(found) / expected - 1.0).abs() < 0.02);
+        same += u32::from(found > 0.0 && (f64::from(found) / expected - 1.0).abs() < 0.05);
     }
-    assert!(both > 4000 && same > both * 9 / 10, "{same} of {both}");
+    assert!(both > 4000 && same > both * 17 / 20, "{same} of {both}");
 
     // The same command finds everything done.
     let printed = reconstruct(&distorted, &undistorted, &[]);
