@@ -261,7 +261,8 @@ mod tests {
 
     #[test]
     fn poses_in_another_convention_are_named() {
-        let given: [(fn(Pose) -> Pose, Convention, &str); 4] = [
+        type Change = fn(Pose) -> Pose;
+        let given: [(Change, Convention, &str); 4] = [
             (inverse, Convention::WorldToCamera, "the poses look like camera-to-world; expected world-to"),
             (flipped, Convention::WorldToCamera, "look like world-to-camera with OpenGL's axes"),
             (flipped, Convention::CameraToWorldOpenGl, "look like camera-to-world with OpenCV's axes"),
