@@ -1,6 +1,7 @@
 """skep and pycolmap: reconstructions are read and workspaces written without a shift of half a pixel."""
 
 import os
+import shutil
 
 import made
 import numpy as np
@@ -122,3 +123,36 @@ def test_distorted_cameras_and_missing_images_are_refused(pycolmap, reconstructi
     distorted.cameras[1].params = [100, 48, 36, 0.1]
     with pytest.raises(skep.ArgumentError, match="camera 1 is SIMPLE_RADIAL.*undistort"):
         skep.from_pycolmap(distorted, folder / "images")
+
+
+@pytest.mark.parametrize(
+    ("model", "distortion"),
+    [
+        ("RADIAL", [-0.06, 0.01]),
+        ("OPENCV", [-0.06, 0.01, 0.001, -0.0005]),
+        ("FULL_OPENCV", [-0.06, 0.01, 0.001, -0.0005, 0.002, 0.01, 0.002, 0.001]),
+        ("OPENCV_FISHEYE", [0.01, -0.005, 0.001, 0.0]),
+        ("THIN_PRISM_FISHEYE", [0.01, -0.005, 0.001, 0.0, 0.001, 0.0005, 0.001, 0.0005]),
+        ("FOV", [0.5]),
+    ],
+)
+def test_photographs_are_undistorted_as_colmap_does(pycolmap, folder, tmp_path, model, distortion):
+    focal = [1.2 * made.WIDTH] if model == "RADIAL" else [1.2 * made.WIDTH, 1.21 * made.WIDTH]
+    parameters = [*focal, made.WIDTH / 2, made.HEIGHT / 2, *distortion]
+    scene = tmp_path / "scene"
+    shutil.copytree(folder, scene)
+    changed = pycolmap.Reconstruction(str(scene / "sparse"))
+    changed.cameras[1].model = getattr(pycolmap.CameraModelId, model)
+    changed.cameras[1].params = parameters
+    changed.write(str(scene / "sparse"))
+    skep.Job.plan(scene, tmp_path / "run").close()
+
+    camera = pycolmap.Camera(model=model, width=made.WIDTH, height=made.HEIGHT, params=parameters)
+    options = pycolmap.UndistortCameraOptions()
+    bitmap = pycolmap.Bitmap.read(str(scene / "images" / "0.png"), True)
+    image, expected = pycolmap.undistort_image(options, bitmap, camera)
+    (own,) = pycolmap.Reconstruction(str(tmp_path / "run" / "sparse")).cameras.values()
+    assert (own.width, own.height) == (expected.width, expected.height)
+    np.testing.assert_allclose(own.params, expected.params, rtol=1e-9)
+    found = pycolmap.Bitmap.read(str(tmp_path / "run" / "images" / "0.png"), True).to_array()
+    assert np.abs(found.astype(int) - image.to_array().astype(int)).max() <= 1
