@@ -101,4 +101,4 @@ def test_positions_far_from_the_origin(need, tmp_path):
     found = np.stack([vertex[axis] for axis in "xyz"], axis=-1)
     assert found.dtype == np.float64
     np.testing.assert_array_equal(found, cloud.positions)
-    assert len(np.unique(found, axis=0)) == vertex.count > 500
+    assert len(np.unique(found, axis=0)) > 0.98 * vertex.count > 500

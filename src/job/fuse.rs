@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::fusion::{CloudSource, LoadedView, PointCloud, StreamedViews, overlaps, streamed_bytes};
 use crate::io::{ModelImage, WorkspaceMaps, WorkspaceView, check_file_place};
 use crate::memory::{format_bytes, require_memory};
-use crate::options::Options;
+use crate::options::{CloudFormat, Options, OutputOptions};
 use crate::parallel::{JoinedPool, ProgressFn, useful_threads};
 use crate::scene::SparsePoint;
 use glam::DVec3;
@@ -44,8 +44,8 @@ pub struct FusedWorkspace {
     pub depths: u64,
 }
 
-/// Fuses the maps of a workspace, on a thread pool of its own, and writes a file in the format of the option
-/// `output.cloud_format`, the views of its points, `PATH.vis`, beside it, and with `output.splat` the folder
+/// Fuses the maps of a workspace, on a thread pool of its own, and writes a file in the format of its ending,
+/// the views of its points, `PATH.vis`, beside it, and with `output.splat` the folder
 /// `splat`. Of the maps and photographs only those of a view and of the views that
 /// overlap with it are in memory, and as many others as the option `memory` allows; of the other options the
 /// fusion's and `threads` count.
@@ -117,7 +117,9 @@ fn fuse_on_pool(
         photographs: maps.photographs().to_owned(),
         splat: path.parent().unwrap_or(Path::new("")).join("splat"),
     };
-    made.write(path, &options.output, &scene)?;
+    // The ending says the format.
+    let output = OutputOptions { cloud_format: CloudFormat::of_file(path)?, ..options.output };
+    made.write(path, &output, &scene)?;
     let points = made.len() as u64;
     Ok(FusedWorkspace { points, points_without_color, pixels, depths: depths.into_inner() })
 }
