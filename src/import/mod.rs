@@ -1,7 +1,7 @@
 //! Scenes as people bring them: from several programs, with lenses that distort, and larger than wanted.
 //!
-//! A [`SourceScene`] is what a file of such a program says. `prepare.rs` makes a COLMAP workspace
-//! of it, whose photographs have neither distortion nor more pixels than wanted; everything else reads only that.
+//! A [`SourceScene`] is what a file of such a program says. `prepare.rs` makes a COLMAP workspace of it,
+//! whose photographs have neither distortion nor more pixels than wanted; everything else reads only that.
 //!
 //! | step | file |
 //! |---|---|
@@ -18,6 +18,7 @@ mod selection;
 mod source_lists;
 
 use crate::geometry::{DepthRange, Lens};
+use crate::io::SceneFolder;
 use crate::scene::SparsePoint;
 pub use formats::read;
 pub(crate) use prepare::{Extra, Prepared, prepare};
@@ -32,6 +33,8 @@ pub struct SourceScene {
     pub photographs: Vec<SourcePhotograph>,
     /// Points on the surfaces, with the indices of the photographs that saw them, where the file says that.
     pub points: Vec<SparsePoint>,
+    /// Photographs and model, where they are those of a COLMAP workspace.
+    pub workspace: Option<SceneFolder>,
     /// What was left out or guessed, as sentences.
     pub warnings: Vec<String>,
 }
@@ -51,4 +54,11 @@ pub struct SourcePhotograph {
     pub depth_range: Option<DepthRange>,
     /// The photographs to match it with, as indices, the best first, where the file says so.
     pub sources: Option<Vec<u32>>,
+}
+
+impl SourcePhotograph {
+    /// A photograph of which nothing else is known.
+    pub fn new(name: String, path: PathBuf, lens: Lens) -> SourcePhotograph {
+        SourcePhotograph { name, path, lens, mask: None, depth_range: None, sources: None }
+    }
 }

@@ -13,7 +13,8 @@ use crate::io::{
     link_or_copy, opaque_pixels, picture_from_bytes, picture_header, read_mask, write_mask, write_photograph,
 };
 use crate::io::{Fingerprint, fingerprint, fingerprint_file};
-use crate::options::InputOptions;
+use crate::memory::{memory_budget, require_memory};
+use crate::options::{InputOptions, Options};
 use crate::parallel::{Phase, Progress, ProgressFn};
 use crate::pipeline::Tracker;
 use rayon::prelude::*;
@@ -23,6 +24,9 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Prepared {
     pub folder: SceneFolder,
+    /// Whether the folder is that of the run, with photographs that were decoded and compared with their
+    /// record.
+    pub is_imported: bool,
     /// What the model does not hold, one for each of its images; none where there is nothing.
     pub extras: Vec<Extra>,
     /// What was found out on the way, as sentences.
@@ -46,10 +50,11 @@ pub(crate) struct Extra {
 /// camera; a choice that fits nothing; a file that cannot be written; [`Error::Cancelled`].
 pub(crate) fn prepare(
     scene: &Path,
-    options: &InputOptions,
+    options: &Options,
     folder: &Path,
     progress: ProgressFn,
 ) -> Result<Prepared> {
+    let (memory, options) = (memory_budget(options.memory), &options.input);
     let mut source = formats::read(scene)?;
     if !options.sources.is_empty() {
         read_source_lists(&mut source, Path::new(&options.sources))?;
@@ -72,9 +77,8 @@ pub(crate) fn prepare(
     }
     let import = Import { source: &source, options, folder, white };
     let changes = import.changes()?;
-    if let Some(sparse) = import.stays(scene, &changes)? {
-        let folder = SceneFolder { images: scene.join("images"), sparse };
-        return Ok(Prepared { folder, extras: Vec::new(), warnings });
+    if let Some(folder) = import.unchanged(&changes) {
+        return Ok(Prepared { folder, is_imported: false, extras: Vec::new(), warnings });
     }
     import.refuse_own_folder()?;
     let record = Record::read(folder);
@@ -84,7 +88,16 @@ pub(crate) fn prepare(
         advance(1, view)?;
         Ok(entry)
     };
-    let entries: Vec<Result<Entry>> = changes.par_iter().enumerate().with_max_len(1).map(entry).collect();
+    // As many at a time as fit into the memory.
+    let largest = changes.iter().map(Change::memory).max().unwrap_or(0);
+    require_memory(largest, "the change of a photograph")?;
+    let at_a_time = (memory / largest.max(1)).clamp(1, rayon::current_num_threads() as u64) as usize;
+    let numbered: Vec<(usize, &Change)> = changes.iter().enumerate().collect();
+    let in_turns = numbered.chunks(numbered.len().div_ceil(at_a_time).max(1)).collect::<Vec<_>>();
+    let one_by_one =
+        |part: &[(usize, &Change)]| part.iter().copied().map(entry).collect::<Vec<Result<Entry>>>();
+    let entries: Vec<Result<Entry>> =
+        in_turns.into_par_iter().with_max_len(1).flat_map_iter(one_by_one).collect();
     // What is done is noted even if the rest failed: the next call does not do it again.
     let names = source.photographs.iter().map(|photograph| photograph.name.clone());
     let done = names.zip(&entries).filter_map(|(name, entry)| Some((name, entry.as_ref().ok()?.clone())));
@@ -97,7 +110,12 @@ pub(crate) fn prepare(
         sources: photograph.sources.clone(),
     };
     let extras = source.photographs.iter().zip(&entries).map(extra).collect();
-    Ok(Prepared { folder: SceneFolder { images: folder.join("images"), sparse }, extras, warnings })
+    Ok(Prepared {
+        folder: SceneFolder { images: folder.join("images"), sparse },
+        is_imported: true,
+        extras,
+        warnings,
+    })
 }
 
 /// The file of a mask in a workspace, as COLMAP names it.
@@ -137,8 +155,8 @@ fn find_masks(source: &mut SourceScene, folder: &Path) -> Result<()> {
     }
 }
 
-/// The value of white in photographs of 16 bits: the largest of the usual ones that is needed for all of them,
-/// since cameras and converters store 10, 12 or 14 bits in 16.
+/// The value of white in photographs of 16 bits: the largest of the usual ones that is needed for all of
+/// them, since cameras and converters store 10, 12 or 14 bits in 16.
 fn white_level(source: &SourceScene, before: &(dyn Fn(usize) -> Result<()> + Sync)) -> Result<u16> {
     let largest = |(view, photograph): (usize, &SourcePhotograph)| -> Result<Option<u16>> {
         before(view)?;
@@ -194,8 +212,8 @@ impl Import<'_> {
         self.source.photographs.par_iter().with_max_len(1).map(change).collect()
     }
 
-    /// The folder of the model if the scene is a COLMAP workspace that nothing is to be changed in.
-    fn stays(&self, scene: &Path, changes: &[Change]) -> Result<Option<PathBuf>> {
+    /// The scene, if it is a COLMAP workspace in which nothing is to be changed.
+    fn unchanged(&self, changes: &[Change]) -> Option<SceneFolder> {
         let has_extra = |photograph: &SourcePhotograph| {
             let SourcePhotograph { mask, depth_range, sources, .. } = photograph;
             mask.is_some() || depth_range.is_some() || sources.is_some()
@@ -205,15 +223,7 @@ impl Import<'_> {
             && self.white == u16::MAX
             && changes.iter().all(Change::is_none)
             && !self.source.photographs.iter().any(has_extra);
-        match SceneFolder::find(scene) {
-            Ok(found) if is_as_it_is => {
-                let is_there =
-                    |photograph: &SourcePhotograph| photograph.path == found.images.join(&photograph.name);
-                let stays = self.source.photographs.iter().all(is_there);
-                Ok(stays.then_some(found.sparse))
-            }
-            _ => Ok(None),
-        }
+        self.source.workspace.clone().filter(|_| is_as_it_is)
     }
 
     /// Returns an error if a photograph would be replaced by a changed one, or a scene that no run put there.
@@ -232,7 +242,7 @@ impl Import<'_> {
         match self.source.photographs.iter().find(is_own) {
             Some(photograph) => Err(Error::file(
                 &photograph.path,
-                "would be replaced by a changed photograph; name a folder for the results that is not the scene's",
+                "would be replaced by a changed photograph; name another folder than the scene's for the results",
             )),
             None => Ok(()),
         }
@@ -289,7 +299,7 @@ impl Import<'_> {
         let Camera { width, height, .. } = photograph.lens.camera;
         let mut own = photograph.mask.as_deref().map(|path| read_mask(path, (width, height))).transpose()?;
         if self.options.alpha_mask
-            && let Some(opaque) = opaque_pixels(bytes, &photograph.path)?
+            && let Some(opaque) = opaque_pixels(bytes, &photograph.path, (width, height))?
         {
             own = Some(match own {
                 Some(mask) => mask.iter().zip(&opaque).map(|(&a, &b)| a && b).collect(),

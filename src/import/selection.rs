@@ -6,8 +6,8 @@ use crate::io::cannot_be_read;
 use std::path::Path;
 
 /// Keeps the photographs that a text chooses: names or patterns with `*` (any letters) and `?` (one letter),
-/// separated by commas, or the path of a file with one on each line. Points lose their views that are left out;
-/// those that no chosen photograph saw are dropped where points have tracks.
+/// separated by commas, or the path of a file with one on each line. Points lose their views that are left
+/// out; those that no chosen photograph saw are dropped where points have tracks.
 ///
 /// # Errors
 /// An entry that no photograph matches; fewer than two photographs.
@@ -76,17 +76,30 @@ fn entries(chosen: &str) -> Result<Vec<String>> {
     Ok(lines.filter(|line| !line.is_empty() && !line.starts_with('#')).map(str::to_owned).collect())
 }
 
-/// Whether a name is of a pattern.
+/// Whether a name is of a pattern. Takes at most the product of their lengths in steps: only the last `*` is
+/// ever tried again, as an earlier one could not make up for what follows the last.
 fn matches(pattern: &[u8], name: &[u8]) -> bool {
-    match (pattern.split_first(), name.split_first()) {
-        (None, None) => true,
-        (Some((b'*', rest)), _) => {
-            matches(rest, name) || name.split_first().is_some_and(|(_, after)| matches(pattern, after))
+    let (mut in_pattern, mut in_name) = (0, 0);
+    // Behind the last `*`, and the end of what it stands for.
+    let mut last_star: Option<(usize, usize)> = None;
+    while let Some(&letter) = name.get(in_name) {
+        match (pattern.get(in_pattern), last_star) {
+            (Some(b'*'), _) => {
+                in_pattern += 1;
+                last_star = Some((in_pattern, in_name));
+            }
+            (Some(&wanted), _) if wanted == b'?' || wanted == letter => {
+                in_pattern += 1;
+                in_name += 1;
+            }
+            (_, Some((behind, end))) => {
+                last_star = Some((behind, end + 1));
+                (in_pattern, in_name) = (behind, end + 1);
+            }
+            (_, None) => return false,
         }
-        (Some((b'?', rest)), Some((_, after))) => matches(rest, after),
-        (Some((letter, rest)), Some((first, after))) => letter == first && matches(rest, after),
-        _ => false,
     }
+    pattern[in_pattern..].iter().all(|&letter| letter == b'*')
 }
 
 #[cfg(test)]
@@ -100,18 +113,19 @@ mod tests {
 
     fn scene() -> SourceScene {
         let photograph = |name: &str| SourcePhotograph {
-            name: name.to_owned(),
-            path: name.into(),
-            lens: Lens { camera: testing::camera(0.0, (8, 6)), distortion: None },
-            mask: None,
-            depth_range: None,
             sources: Some(vec![0, 1, 2]),
+            ..SourcePhotograph::new(
+                name.to_owned(),
+                name.into(),
+                Lens { camera: testing::camera(0.0, (8, 6)), distortion: None },
+            )
         };
         let point = |views: &[u32]| SparsePoint { position: DVec3::ONE, views: views.to_vec() };
         SourceScene {
             origin: "a test".to_owned(),
             photographs: ["a/1.jpg", "a/2.jpg", "b/1.jpg", "b/10.jpg"].map(photograph).to_vec(),
             points: vec![point(&[0, 2, 3]), point(&[0, 1]), point(&[])],
+            workspace: None,
             warnings: Vec::new(),
         }
     }
@@ -132,6 +146,17 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), "# the first folder\na/*\n").unwrap();
         assert_eq!(chosen(file.path().to_str().unwrap()), ["a/1.jpg", "a/2.jpg"]);
+    }
+
+    #[test]
+    fn a_pattern_of_many_stars_is_decided_at_once() {
+        let name = "a".repeat(200);
+        assert!(matches("a*".repeat(100).as_bytes(), name.as_bytes()));
+        assert!(!matches(("a*".repeat(100) + "b").as_bytes(), name.as_bytes()));
+        let cases = [("*", ""), ("*a*b", "xaab"), ("a**c", "ac"), ("?*", "x"), ("", "")];
+        assert!(cases.iter().all(|(pattern, name)| matches(pattern.as_bytes(), name.as_bytes())));
+        let others = [("?", ""), ("*a", "ab"), ("a*b*c", "acb"), ("", "a")];
+        assert!(!others.iter().any(|(pattern, name)| matches(pattern.as_bytes(), name.as_bytes())));
     }
 
     #[test]

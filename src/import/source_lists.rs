@@ -7,8 +7,8 @@ use std::collections::HashMap;
 use std::path::Path;
 
 /// Takes the source views of a file: for each photograph a line with its name and one with the names of its
-/// sources, separated by commas, the best first; or `__all__`, or `__auto__, N`, which leaves the choice to the
-/// triangulation angles. Photographs that the file does not name keep what they have.
+/// sources, separated by commas, the best first; or `__all__`, or `__auto__, N`, which leaves the choice to
+/// the triangulation angles. Photographs that the file does not name keep what they have.
 ///
 /// # Errors
 /// A file that cannot be read; a name that the scene does not have; a photograph that is its own source.
@@ -63,19 +63,19 @@ mod tests {
     use crate::testing;
 
     fn read(text: &str) -> Result<Vec<Option<Vec<u32>>>> {
-        let photograph = |name: &str| SourcePhotograph {
-            name: name.to_owned(),
-            path: name.into(),
-            lens: Lens { camera: testing::camera(0.0, (8, 6)), distortion: None },
-            mask: None,
-            depth_range: None,
-            sources: None,
+        let photograph = |name: &str| {
+            SourcePhotograph::new(
+                name.to_owned(),
+                name.into(),
+                Lens { camera: testing::camera(0.0, (8, 6)), distortion: None },
+            )
         };
         let photographs = ["a b.jpg", "c.jpg", "d.jpg"].map(photograph).to_vec();
         let mut scene = SourceScene {
             origin: "a test".to_owned(),
             photographs,
             points: Vec::new(),
+            workspace: None,
             warnings: Vec::new(),
         };
         let file = tempfile::NamedTempFile::new().unwrap();

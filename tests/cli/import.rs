@@ -113,6 +113,25 @@ fn photographs_are_reduced_chosen_and_masked_as_asked() {
 }
 
 #[test]
+fn of_several_models_the_largest_is_the_run_s() {
+    let (scene, output) = (small_board(), TempDir::new().unwrap());
+    let sparse = scene.path().join("sparse");
+    let mut model = ColmapModel::read(&sparse).unwrap();
+    for name in ["cameras.txt", "images.txt", "points3D.txt"] {
+        fs::remove_file(sparse.join(name)).unwrap();
+    }
+    model.write_binary(&sparse.join("1")).unwrap();
+    // The part of the photographs that the mapper registered first.
+    model.images.truncate(3);
+    model.points.iter_mut().for_each(|point| point.views.retain(|&view| view < 3));
+    model.write_binary(&sparse.join("0")).unwrap();
+    let done = skep(&["plan", path(&scene), "--output", path(&output)]);
+    assert!(done.status.success(), "{}", text(&done.stderr));
+    assert!(text(&done.stderr).contains("sparse/1"), "{}", text(&done.stderr));
+    assert_eq!(ColmapModel::read(&output.path().join("sparse")).unwrap().images.len(), NAMES.len());
+}
+
+#[test]
 fn bounds_leave_only_what_is_inside() {
     let (scene, output) = (small_board(), TempDir::new().unwrap());
     reconstruct(&scene, &output, &["--bounds", "-0.3", "-10", "-10", "0.3", "10", "10"]);

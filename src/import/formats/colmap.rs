@@ -4,7 +4,7 @@ use super::photographs;
 use crate::error::{Error, Result};
 use crate::geometry::Lens;
 use crate::import::{SourcePhotograph, SourceScene};
-use crate::io::{ColmapModel, FileReader, ModelImage};
+use crate::io::{ColmapModel, FileReader, ModelImage, SceneFolder};
 use std::path::{Path, PathBuf};
 
 pub(super) fn is_at(path: &Path) -> bool {
@@ -69,19 +69,14 @@ pub(super) fn read(path: &Path) -> Result<SourceScene> {
     let (model, distortions) = ColmapModel::read_with_lenses(&sparse)?;
     let entry = format!("the model in {}", sparse.display());
     let photograph = |(image, distortion): (ModelImage, _)| {
-        Ok(SourcePhotograph {
-            path: photographs::find(images.join(&image.name), &entry)?,
-            name: image.name,
-            lens: Lens { camera: image.camera, distortion },
-            mask: None,
-            depth_range: None,
-            sources: None,
-        })
+        let path = photographs::find(images.join(&image.name), &entry)?;
+        Ok(SourcePhotograph::new(image.name, path, Lens { camera: image.camera, distortion }))
     };
     Ok(SourceScene {
         origin: format!("the COLMAP model in {}", sparse.display()),
         photographs: model.images.into_iter().zip(distortions).map(photograph).collect::<Result<_>>()?,
         points: model.points,
+        workspace: Some(SceneFolder { images: images.clone(), sparse }),
         warnings,
     })
 }

@@ -3,6 +3,7 @@
 //! A line is the name, the calibration matrix, the rotation and the translation from the world to the camera,
 //! matrices row by row. Pixel centers are taken to be integers. There are no points.
 
+use super::calibration::{CALIBRATION, pinhole};
 use super::photographs;
 use super::poses::{ROTATION, from_rows, rotation};
 use super::text::{self, Words};
@@ -14,8 +15,6 @@ use glam::DVec3;
 use std::path::{Path, PathBuf};
 
 const ENDING: &str = "_par.txt";
-/// Pixels of shear for a ray at 45 degrees that is taken for rounding.
-const MAX_SKEW: f64 = 0.05;
 
 pub(super) fn is_at(path: &Path) -> bool {
     is_parameters(path) || !parameters(path).is_empty()
@@ -64,31 +63,21 @@ pub(super) fn read(path: &Path) -> Result<SourceScene> {
             words.error(format!("{word:?} follows {count} photographs; expected the end of the file"))
         );
     }
-    let photograph = |((name, path), lens)| SourcePhotograph {
-        name,
-        path,
-        lens,
-        mask: None,
-        depth_range: None,
-        sources: None,
-    };
+    let photograph = |((name, path), lens)| SourcePhotograph::new(name, path, lens);
     let names = photographs::names(&paths)?;
     Ok(SourceScene {
         origin: format!("the cameras in {}", file.display()),
         photographs: names.into_iter().zip(paths).zip(lenses).map(photograph).collect(),
         points: Vec::new(),
+        workspace: None,
         warnings: Vec::new(),
     })
 }
 
 fn lens(words: &mut Words, name: &str, (width, height): (u32, u32)) -> Result<Lens> {
-    let [fx, skew, cx, k21, fy, cy, k31, k32, k33] = words.numbers(&format!("the calibration of {name}"))?;
-    if skew.abs() > MAX_SKEW || [k21, k31, k32] != [0.0; 3] || k33 != 1.0 {
-        let rows = format!("{fx} {skew} {cx}, {k21} {fy} {cy}, {k31} {k32} {k33}");
-        return Err(words.error(format!(
-            "the calibration of {name} is {rows}; expected f 0 x, 0 f y, 0 0 1 (skew up to {MAX_SKEW})"
-        )));
-    }
+    let k: [f64; 9] = words.numbers(&format!("the calibration of {name}"))?;
+    let [fx, fy, cx, cy] = pinhole(k, 1.0)
+        .ok_or_else(|| words.error(format!("the calibration of {name} is {k:?}; expected {CALIBRATION}")))?;
     let r: [f64; 9] = words.numbers(&format!("the rotation of {name}"))?;
     let matrix = from_rows([[r[0], r[1], r[2]], [r[3], r[4], r[5]], [r[6], r[7], r[8]]]);
     let rotation = rotation(matrix)

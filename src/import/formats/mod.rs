@@ -3,6 +3,7 @@
 //! Names of photographs in the results are those of COLMAP's model, and else the paths below the innermost
 //! folder that holds all photographs.
 
+mod calibration;
 mod colmap;
 mod json;
 mod middlebury;

@@ -10,6 +10,7 @@
 //! are `rect_001_3_r5000.png` and so on, of which lighting 3 is read, and its cameras are in
 //! `Cameras/train/` beside `Rectified/`.
 
+use super::calibration::{CALIBRATION, pinhole};
 use super::photographs;
 use super::poses::{ROTATION, from_rows, rotation};
 use super::text::{self, Words};
@@ -31,8 +32,6 @@ const DEFAULT_INTERVALS: f64 = 192.0 * 1.06;
 const REDUCTION: f64 = 4.0;
 /// Where principal points lie, as shares of a side.
 const CENTRAL: std::ops::Range<f64> = 0.25..0.75;
-/// Pixels of shear for a ray at 45 degrees that is taken for rounding.
-const MAX_SKEW: f64 = 0.05;
 
 /// The files of a scene.
 struct Layout {
@@ -107,19 +106,18 @@ pub(super) fn read(path: &Path) -> Result<SourceScene> {
     let names = photographs::names(&paths)?;
     let photograph = |((name, file), index): ((String, CameraFile), u32)| {
         file.camera.check("its camera").map_err(|error| Error::file(&file.path, error))?;
+        let lens = Lens { camera: file.camera, distortion: None };
         Ok(SourcePhotograph {
-            name,
-            path: file.photograph,
-            lens: Lens { camera: file.camera, distortion: None },
-            mask: None,
             depth_range: Some(file.range),
             sources: sources.remove(&index),
+            ..SourcePhotograph::new(name, file.photograph, lens)
         })
     };
     Ok(SourceScene {
         origin: format!("the cameras in {}", layout.cameras.display()),
         photographs: names.into_iter().zip(files).zip(0..).map(photograph).collect::<Result<_>>()?,
         points: Vec::new(),
+        workspace: None,
         warnings,
     })
 }
@@ -175,11 +173,8 @@ fn read_camera(path: PathBuf, photograph: PathBuf) -> Result<CameraFile> {
     let translation = DVec3::new(e[3], e[7], e[11]);
     words.keyword("intrinsic")?;
     let k: [f64; 9] = words.numbers("the intrinsic matrix")?;
-    let [fx, skew, cx, k21, fy, cy, k31, k32, k33] = k;
-    if skew.abs() > MAX_SKEW || [k21, k31, k32] != [0.0; 3] || k33 != 1.0 {
-        let expected = format!("f 0 x, 0 f y, 0 0 1 (skew up to {MAX_SKEW})");
-        return Err(words.error(format!("the intrinsic matrix is {k:?}; expected {expected}")));
-    }
+    let [fx, fy, cx, cy] = pinhole(k, 1.0)
+        .ok_or_else(|| words.error(format!("the intrinsic matrix is {k:?}; expected {CALIBRATION}")))?;
     let [near, interval] = words.numbers("the smallest depth and the interval")?;
     let (far, has_largest_depth) = match words.remaining() {
         0 => (near + DEFAULT_INTERVALS * interval, false),

@@ -50,7 +50,7 @@ pub(super) fn read(path: &Path) -> Result<SourceScene> {
     };
     let points = points.into_iter().map(|position| SparsePoint { position, views: Vec::new() }).collect();
     let origin = format!("the cameras in {}", file.display());
-    let mut scene = SourceScene { origin, photographs, points, warnings: Vec::new() };
+    let mut scene = SourceScene { origin, photographs, points, workspace: None, warnings: Vec::new() };
     if let Some(transform) = root.get("applied_transform")? {
         move_cloud(&mut scene, &transform)?;
     }
@@ -76,14 +76,8 @@ fn read_frames(root: &Entry, folder: &Path) -> Result<Vec<SourcePhotograph>> {
     }
     let names = photographs::names(&paths)?;
     let parts = names.into_iter().zip(paths).zip(lenses.into_iter().zip(masks));
-    let photograph = |((name, path), (lens, mask))| SourcePhotograph {
-        name,
-        path,
-        lens,
-        mask,
-        depth_range: None,
-        sources: None,
-    };
+    let photograph =
+        |((name, path), (lens, mask))| SourcePhotograph { mask, ..SourcePhotograph::new(name, path, lens) };
     Ok(parts.map(photograph).collect())
 }
 

@@ -5,6 +5,7 @@
 //! centers are integers. Depth ranges and neighbors of images are not taken over: they come from the same
 //! points that are read.
 
+use super::calibration::{CALIBRATION, pinhole};
 use super::photographs;
 use super::poses::{ROTATION, from_rows, rotation};
 use crate::error::{Error, Result};
@@ -20,10 +21,8 @@ const MAGIC: [u8; 4] = *b"MVSI";
 /// How files start that OpenMVS serializes for itself, compressed or not.
 const OWN_MAGIC: [u8; 4] = *b"MVS\0";
 const LATEST_VERSION: u32 = 7;
-/// The index of what there is not.
+/// The index that stands for none.
 const NONE: u32 = u32::MAX;
-/// Pixels of shear for a ray at 45 degrees that is taken for rounding.
-const MAX_SKEW: f64 = 0.05;
 /// A normalized principal point is below this; others are in pixels.
 const MAX_NORMALIZED: f64 = 3.0;
 /// Memory for a byte of the file, mostly points with short lists of views.
@@ -274,16 +273,16 @@ fn resolve(
     }
     let names = photographs::names(&paths)?;
     let parts = names.into_iter().zip(paths).zip(lenses.into_iter().zip(masks));
-    let photograph = |((name, path), (lens, mask))| SourcePhotograph {
-        name,
-        path,
-        lens,
-        mask,
-        depth_range: None,
-        sources: None,
-    };
+    let photograph =
+        |((name, path), (lens, mask))| SourcePhotograph { mask, ..SourcePhotograph::new(name, path, lens) };
     let origin = format!("the OpenMVS scene in {}", path.display());
-    Ok(SourceScene { origin, photographs: parts.map(photograph).collect(), points, warnings })
+    Ok(SourceScene {
+        origin,
+        photographs: parts.map(photograph).collect(),
+        points,
+        workspace: None,
+        warnings,
+    })
 }
 
 /// A path with this system's separators: archives that were written on Windows have the others.
@@ -304,18 +303,14 @@ fn lens(
     let platform = at(platforms, image.platform, "platform")?;
     let camera = at(&platform.cameras, image.camera, "camera")?;
     let (rotation, center) = at(&platform.poses, image.pose, "pose")?;
-    let [fx, skew, cx, k21, fy, cy, k31, k32, k33] = camera.calibration;
     let side = f64::from(width.max(height));
     let is_normalized = camera.size.0 == 0 || camera.size.1 == 0;
     let scale = match camera.size {
         _ if is_normalized => side,
         size => side / f64::from(size.0.max(size.1)),
     };
-    let is_matrix = [k21, k31, k32] == [0.0; 3] && k33 == 1.0 && (skew * scale).abs() <= MAX_SKEW;
-    if !is_matrix {
-        let expected = format!("f 0 x, 0 f y, 0 0 1 (skew up to {MAX_SKEW} pixels)");
-        return Err(format!("its calibration is {:?}; expected {expected}", camera.calibration));
-    }
+    let [fx, fy, cx, cy] = pinhole(camera.calibration, scale)
+        .ok_or_else(|| format!("its calibration is {:?}; expected {CALIBRATION}", camera.calibration))?;
     if is_normalized && !(cx < MAX_NORMALIZED && cy < MAX_NORMALIZED) {
         return Err(format!(
             "its principal point is {cx}, {cy} and its camera has no resolution; expected one divided by the \

@@ -72,19 +72,13 @@ pub(super) fn read(path: &Path) -> Result<SourceScene> {
         paths.push(path);
     }
     let points = read_points(&reconstruction, &folder, &indices)?;
-    let photograph = |((name, path), lens)| SourcePhotograph {
-        name,
-        path,
-        lens,
-        mask: None,
-        depth_range: None,
-        sources: None,
-    };
+    let photograph = |((name, path), lens)| SourcePhotograph::new(name, path, lens);
     let names = photographs::names(&paths)?;
     Ok(SourceScene {
         origin: format!("the reconstruction in {}", file.display()),
         photographs: names.into_iter().zip(paths).zip(found).map(photograph).collect(),
         points,
+        workspace: None,
         warnings,
     })
 }

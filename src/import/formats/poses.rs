@@ -214,14 +214,8 @@ mod tests {
             let angle = f64::from(index) * 0.3;
             let position = DVec3::new(5.0 * angle.sin(), 1.0 + 0.2 * angle, -5.0 * angle.cos());
             let camera = looking_at(MIDDLE + position, MIDDLE, (64, 48), 50.0);
-            SourcePhotograph {
-                name: format!("{index}.png"),
-                path: format!("{index}.png").into(),
-                lens: with_pose(&Lens { camera, distortion: None }, change),
-                mask: None,
-                depth_range: None,
-                sources: None,
-            }
+            let (name, lens) = (format!("{index}.png"), Lens { camera, distortion: None });
+            SourcePhotograph::new(name.clone(), name.into(), with_pose(&lens, change))
         };
         let point = |index: u32| {
             let angle = f64::from(index);
@@ -232,6 +226,7 @@ mod tests {
             origin: "a test".to_owned(),
             photographs: (0..5).map(photograph).collect(),
             points: (0..40).map(point).collect(),
+            workspace: None,
             warnings: Vec::new(),
         }
     }
