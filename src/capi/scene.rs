@@ -278,7 +278,8 @@ pub unsafe extern "C" fn skep_scene_add_points(
         };
         let mut rest = views;
         // A point and the list of its views.
-        require_memory(64 * count as u64 + 4 * view_total as u64, "a copy of the points")?;
+        let bytes = (count as u64).saturating_mul(64).saturating_add((view_total as u64).saturating_mul(4));
+        require_memory(bytes, "a copy of the points")?;
         let mut points = Vec::with_capacity(count);
         for (index, (position, &seen)) in positions.iter().zip(view_counts).enumerate() {
             let position = DVec3::from_array(*position);

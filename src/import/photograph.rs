@@ -1,12 +1,16 @@
 //! A photograph as the workspace has it: without distortion, and not larger than wanted.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geometry::{Camera, Lens};
 use crate::image::Picture;
 use glam::DVec2;
 use image::imageops::{FilterType, resize};
 use image::{GrayImage, ImageBuffer, RgbImage};
 use rayon::prelude::*;
+
+/// Bytes of a photograph for each pixel while it is changed: of the file, decoded, as a picture, undistorted,
+/// reduced and encoded.
+const BYTES_PER_PIXEL: u64 = 32;
 
 /// How a photograph is changed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,10 +26,17 @@ impl Change {
     /// Removes the distortion, and reduces the longer side to `max_size` pixels if it has more; 0 keeps all.
     ///
     /// # Errors
-    /// A lens whose distortion is not valid in the whole image; `name` names it.
+    /// A lens whose distortion is not valid in the whole image, or that spreads it over too many pixels;
+    /// `name` names it.
     pub(super) fn new(lens: Lens, max_size: u32, name: &str) -> Result<Change> {
         let undistorted = lens.undistorted(name)?;
+        undistorted.check(&format!("the undistorted camera of {name}"))?;
         Ok(Change { lens, undistorted, camera: limited(undistorted, max_size) })
+    }
+
+    /// Bytes that the change of a photograph takes, from its file to that of the changed one.
+    pub(super) fn memory(&self) -> u64 {
+        BYTES_PER_PIXEL * self.lens.camera.pixels().max(self.undistorted.pixels()) as u64
     }
 
     /// Whether the photograph stays as it is.
@@ -36,8 +47,13 @@ impl Change {
     /// The changed photograph, on the threads of the current pool.
     ///
     /// # Errors
-    /// Never, for a picture of the lens' size.
+    /// A picture that is not of the lens' size.
     pub(super) fn apply(&self, picture: &Picture) -> Result<Picture> {
+        let size = (self.lens.camera.width, self.lens.camera.height);
+        if (picture.width(), picture.height()) != size {
+            let value = format!("{}x{}", picture.width(), picture.height());
+            return Err(Error::argument("picture", value, format!("{}x{} pixels", size.0, size.1)));
+        }
         let Camera { width, height, .. } = self.camera;
         match picture.color() {
             None => {

@@ -1,5 +1,5 @@
-//! What photographs of any format hold besides eight bits of gray or color: sixteen bits, transparency; and how
-//! changed photographs and masks are written.
+//! What photographs of any format hold besides eight bits of gray or color: sixteen bits, transparency; and
+//! how changed photographs and masks are written.
 
 use super::files::{cannot_be_read, write_file};
 use super::pictures::{decoder, is_gray, limited};
@@ -40,7 +40,8 @@ pub(crate) fn picture_header(path: &Path) -> Result<PictureHeader> {
     read().map_err(|error| cannot_be_read(path, error))
 }
 
-/// The largest value of a photograph with 16 bits a channel, its alpha channel excepted; errors name the file.
+/// The largest value of a photograph with 16 bits a channel, its alpha channel excepted; errors name the
+/// file.
 pub(crate) fn largest_value(bytes: &[u8], path: &Path) -> Result<u16> {
     let image = decoded(bytes, path)?;
     Ok(match image {
@@ -66,8 +67,14 @@ pub(crate) fn deep_picture_from_bytes(bytes: &[u8], path: &Path, white: u16) -> 
 }
 
 /// Whether each pixel of a photograph is not fully transparent; `None` where it has no alpha channel.
-pub(crate) fn opaque_pixels(bytes: &[u8], path: &Path) -> Result<Option<Vec<bool>>> {
+///
+/// # Errors
+/// A file that cannot be decoded; another size than `size`.
+pub(crate) fn opaque_pixels(bytes: &[u8], path: &Path, size: (u32, u32)) -> Result<Option<Vec<bool>>> {
     let image = decoded(bytes, path)?;
+    if (image.width(), image.height()) != size {
+        return Err(Error::file(path, "changed while it was read"));
+    }
     let has_alpha = image.color().has_alpha();
     Ok(has_alpha.then(|| image.into_rgba16().pixels().map(|pixel| pixel.0[3] > 0).collect()))
 }

@@ -85,7 +85,7 @@ pub(super) fn decoder<'a, R: BufRead + Seek + 'a>(
     });
     let decoder = opened.map_err(|error| cannot_be_read(path, error))?;
     let (width, height) = decoder.dimensions();
-    let bytes = decoder.total_bytes() + 4 * u64::from(width) * u64::from(height);
+    let bytes = decoder.total_bytes().saturating_add(4 * u64::from(width) * u64::from(height));
     require_memory(bytes, format!("the photograph {}", path.display()))?;
     Ok(Box::new(decoder))
 }

@@ -8,7 +8,8 @@ use crate::parallel::{Phase, Progress, ProgressFn};
 use crate::scene::is_inside;
 use std::path::{Path, PathBuf};
 
-/// Memory for the averages of voxels at most: those of large clouds are made in several passes over the points.
+/// Memory for the averages of voxels at most: those of large clouds are made in several passes over the
+/// points.
 const VOXEL_MEMORY: u64 = 256 << 20;
 
 /// The points of a cloud, and whether the user wants to go on.
@@ -27,8 +28,9 @@ pub(super) struct CloudScene {
     pub splat: PathBuf,
 }
 
-/// Fuses views, leaves out what is beyond the bounds, and thins the cloud as the options say, in about `memory`
-/// bytes; `change` sees the points as they are made, and may replace them. The cloud is for the file at `path`.
+/// Fuses views, leaves out what is beyond the bounds, and thins the cloud as the options say, in about
+/// `memory` bytes; `change` sees the points as they are made, and may replace them. The cloud is for the file
+/// at `path`.
 ///
 /// # Errors
 /// Maps that cannot be read; a full disk; [`Error::Cancelled`].

@@ -118,8 +118,8 @@ impl RunFolder {
     }
 }
 
-/// A run that is locked. One that begins nothing leaves no trace: the file of the lock and the folders above it
-/// are removed again if they were made for it.
+/// A run that is locked. One that begins nothing leaves no trace: the file of the lock and the folders above
+/// it are removed again if they were made for it.
 #[derive(Debug)]
 pub(super) struct Lock {
     path: PathBuf,

@@ -6,7 +6,7 @@ use super::needs::{self, BASE};
 use crate::error::{Error, Result};
 use crate::fusion::{CloudSource, LoadedView, PointCloud, StreamedViews, overlaps, streamed_bytes};
 use crate::io::{ModelImage, WorkspaceMaps, WorkspaceView, check_file_place};
-use crate::memory::{format_bytes, require_memory};
+use crate::memory::{format_bytes, memory_budget, require_memory};
 use crate::options::{CloudFormat, Options, OutputOptions};
 use crate::parallel::{JoinedPool, ProgressFn, useful_threads};
 use crate::scene::SparsePoint;
@@ -74,14 +74,14 @@ fn fuse_on_pool(
     path: &Path,
     progress: ProgressFn,
 ) -> Result<FusedWorkspace> {
-    // Views without maps are left out, so that they take neither memory nor places among the views that one is
-    // compared with.
+    // Views without maps are left out, so that they take neither memory nor places among the views that one
+    // is compared with.
     let used: Vec<usize> = (0..maps.views.len()).filter(|&view| maps.views[view].has_maps).collect();
     let cameras: Vec<_> = used.iter().map(|&view| &maps.views[view].camera).collect();
     let centers: Vec<DVec3> = cameras.iter().map(|camera| camera.center()).collect();
     let overlaps = overlaps(&centers, &points_of(maps, &used));
     let least = BASE + needs::point_bytes(&maps.points) + streamed_bytes(&cameras, &overlaps);
-    let memory = needs::budget(options);
+    let memory = memory_budget(options.memory);
     if memory < least {
         let expected = format!("at least {} for these maps ({least} bytes)", format_bytes(least));
         return Err(Error::argument("options.memory", format_bytes(memory), expected));

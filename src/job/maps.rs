@@ -9,8 +9,8 @@ use crate::io::{ColmapModel, ModelImage, SceneFolder, Workspace};
 use crate::options::Options;
 use std::path::Path;
 
-/// What of the maps in a folder does not belong to a scene: nothing if no run made them. For a run, files that
-/// are not what it wrote, as sentences.
+/// What of the maps in a folder does not belong to a scene: nothing if no run made them. For a run, files
+/// that are not what it wrote, as sentences.
 ///
 /// # Errors
 /// A run that was made from another model.

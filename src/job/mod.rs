@@ -86,9 +86,10 @@ impl Job {
     /// may change. No other process can work on the run while the job exists.
     ///
     /// # Errors
-    /// An option out of its range; less memory than the run needs; a file that is missing or damaged; a folder
-    /// that cannot be written, holds another scene, or in which another process works; [`Error::Cancelled`].
-    /// An earlier run in the folder is then as it was.
+    /// An option out of its range; less memory than the run needs; a file that is missing or damaged; a
+    /// folder that cannot be written, holds another scene, or in which another process works;
+    /// [`Error::Cancelled`]. An earlier run in the folder is then as it was, but for photographs and model
+    /// where the scene's had to be changed before the run.
     pub fn plan(
         scene: &Path,
         depth_range: Option<DepthRange>,
@@ -103,7 +104,7 @@ impl Job {
         let lock = folder.lock(Access::Whole)?;
         // How much work there is is known from the scene alone.
         let pool = JoinedPool::new(useful_threads(options.threads, usize::MAX))?;
-        let prepared = pool.install(|| prepare(scene, &options.input, folder.root(), progress))?;
+        let prepared = pool.install(|| prepare(scene, options, folder.root(), progress))?;
         let plan = pool.install(|| plan::read(&prepared, depth_range, options, &folder, progress))?;
         let run = plan.manifest.run();
         let mut job = pool.install(|| Job::new(folder, plan.scene, options, run, lock))?;
@@ -179,8 +180,8 @@ impl Job {
         &self.workspace
     }
 
-    /// The views whose files the tasks of a view read, ascending: its own, its sources, and those whose source
-    /// it is.
+    /// The views whose files the tasks of a view read, ascending: its own, its sources, and those whose
+    /// source it is.
     pub fn views_read_by(&self, view: usize) -> Vec<usize> {
         let sources = self.stepper.sources(view).iter().chain(self.stepper.readers(view));
         let mut read: Vec<usize> = sources.map(|&other| other as usize).chain([view]).collect();

@@ -3,15 +3,11 @@
 use super::estimates::{PLANE_BYTES, SURFACE_BYTES};
 use crate::error::{Error, Result};
 use crate::fusion::streamed_bytes;
-use crate::memory::{available_memory, format_bytes};
+use crate::memory::{format_bytes, memory_budget};
 use crate::options::{Options, ViewFiles};
 use crate::pipeline::{Stepper, thread_count};
 use crate::scene::{Scene, SparsePoint};
 
-/// Fraction of the available memory that a run takes by default.
-const DEFAULT_FRACTION: f64 = 0.75;
-/// Memory where the system does not tell how much there is.
-const DEFAULT_MEMORY: u64 = 4 << 30;
 /// Memory of the program, its threads and allocator, before any image.
 pub(super) const BASE: u64 = 192 << 20;
 /// Bytes for each pixel of a view that its search takes besides images and estimates: the planes found, view
@@ -93,14 +89,6 @@ impl Needs {
     }
 }
 
-/// The bytes that a run keeps to: those of the option, or a fraction of what is available.
-pub(super) fn budget(options: &Options) -> u64 {
-    match options.memory {
-        0 => available_memory().map_or(DEFAULT_MEMORY, |bytes| (bytes as f64 * DEFAULT_FRACTION) as u64),
-        bytes => bytes,
-    }
-}
-
 /// Bytes of sparse points in memory.
 pub(super) fn point_bytes(points: &[SparsePoint]) -> u64 {
     points.iter().map(|point| 48 + 4 * point.views.len() as u64).sum()
@@ -157,7 +145,7 @@ pub(super) fn needs(
     let cameras: Vec<_> = scene.views().iter().map(|view| &view.camera).collect();
     let fusion = streamed_bytes(&cameras, overlaps);
     let least = Least { base, view: task, fusion };
-    let memory = budget(options);
+    let memory = memory_budget(options.memory);
     // As many tasks at a time as keep the threads busy, and fit.
     let wanted = 1 + (threads as u64 + 2) / 4;
     let tasks = (memory.saturating_sub(base) / task.max(1)).clamp(1, wanted);

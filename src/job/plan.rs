@@ -61,7 +61,10 @@ pub(super) fn read(
         // Checks that it exists and its size.
         let path = folder.photograph(&image.name, &image.camera)?;
         let bytes = std::fs::read(&path).map_err(|error| cannot_be_read(&path, error))?;
-        picture_from_bytes(&bytes, &path)?;
+        // Photographs that were imported have been decoded.
+        if !prepared.is_imported {
+            picture_from_bytes(&bytes, &path)?;
+        }
         advance(1, view)?;
         let Extra { mask, depth_range, sources } = prepared.extras.get(view).cloned().unwrap_or_default();
         Ok(PhotographEntry {

@@ -128,8 +128,8 @@ impl Record {
         (record.run == text(run)).then_some(record)
     }
 
-    /// The record in the bytes of a file: a line of JSON, and the XXH3 of that line. `None` for anything else,
-    /// and where a path leads out of the run's folder: files are removed by these paths.
+    /// The record in the bytes of a file: a line of JSON, and the XXH3 of that line. `None` for anything
+    /// else, and where a path leads out of the run's folder: files are removed by these paths.
     pub(super) fn parse(bytes: &[u8]) -> Option<Record> {
         let (line, hash) = std::str::from_utf8(bytes).ok()?.split_once('\n')?;
         let record: Record = serde_json::from_str(line).ok()?;

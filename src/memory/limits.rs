@@ -28,6 +28,20 @@ pub fn available_memory() -> Option<u64> {
     machine().into_iter().chain(group_limits(Path::new("/sys/fs/cgroup"), &groups)).min()
 }
 
+/// Fraction of the available memory that is taken by default.
+const DEFAULT_FRACTION: f64 = 0.75;
+/// Memory where the system does not tell how much there is.
+const DEFAULT_MEMORY: u64 = 4 << 30;
+
+/// The bytes to keep to: those of the option `memory`, or a fraction of what is available where it is 0.
+#[cfg(feature = "io")]
+pub(crate) fn memory_budget(option: u64) -> u64 {
+    match option {
+        0 => available_memory().map_or(DEFAULT_MEMORY, |bytes| (bytes as f64 * DEFAULT_FRACTION) as u64),
+        bytes => bytes,
+    }
+}
+
 /// The limits of the control groups that `/proc/self/cgroup` lists, and of the groups around them. A
 /// container often sees its own group as the root.
 fn group_limits(root: &Path, groups: &str) -> Vec<u64> {

@@ -63,8 +63,8 @@ impl ColmapModel {
         Ok(records.resolve(&files)?.0)
     }
 
-    /// Like [`ColmapModel::read`], for any lens: gives the distortion of each image beside the model, in which
-    /// the cameras are those without their lenses.
+    /// Like [`ColmapModel::read`], for any lens: gives the distortion of each image beside the model, in
+    /// which the cameras are those without their lenses.
     ///
     /// # Errors
     /// The errors of [`ColmapModel::read`], but for the distortion.
@@ -94,7 +94,10 @@ fn read_records(folder: &Path) -> Result<(Files, Records)> {
         let wanted = "neither cameras.bin and images.bin nor cameras.txt and images.txt are in this folder";
         return Err(Error::file(folder, format!("no COLMAP model: {wanted}")));
     };
-    require_memory(MEMORY_PER_BYTE * files.bytes(), format!("the model in {}", folder.display()))?;
+    require_memory(
+        files.bytes().saturating_mul(MEMORY_PER_BYTE),
+        format!("the model in {}", folder.display()),
+    )?;
     let records = if files.binary { binary::read(&files)? } else { text::read(&files)? };
     Ok((files, records))
 }
