@@ -1,6 +1,7 @@
 import importlib
 import os
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 
 import made
@@ -16,6 +17,16 @@ def scene() -> skep.Scene:
 @pytest.fixture(scope="session")
 def result(scene: skep.Scene) -> skep.Result:
     return skep.reconstruct(scene, made.options())
+
+
+@pytest.fixture(scope="session")
+def program() -> str:
+    """The command line, which `ffi-tests/test` builds before."""
+    found = os.environ.get("SKEP", str(Path(__file__).parents[2] / "target/release/skep"))
+    if not os.path.isfile(found):
+        message = f"{found} is missing; `cargo build --release --features cli` makes it"
+        pytest.fail(message) if os.environ.get("CI") else pytest.skip(message)
+    return found
 
 
 @pytest.fixture(scope="session")

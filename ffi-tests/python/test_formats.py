@@ -1,6 +1,5 @@
 """Clouds and maps of the command line, read by other packages."""
 
-import os
 import subprocess
 from pathlib import Path
 
@@ -9,18 +8,7 @@ import numpy as np
 import pytest
 import skep
 
-ROOT = Path(__file__).parents[2]
 OPTIONS = ["--quiet", "--schedule", made.TWO_SCALES, "--set", "fusion.min_agreeing_views=2"]
-
-
-@pytest.fixture(scope="module")
-def program() -> str:
-    """The command line, which `ffi-tests/test` builds before."""
-    found = os.environ.get("SKEP", str(ROOT / "target/release/skep"))
-    if not os.path.isfile(found):
-        message = f"{found} is missing; `cargo build --release --features cli` makes it"
-        pytest.fail(message) if os.environ.get("CI") else pytest.skip(message)
-    return found
 
 
 def succeed(*command) -> None:

@@ -10,19 +10,8 @@ from pathlib import Path
 import made
 import pytest
 
-ROOT = Path(__file__).parents[2]
 OPTIONS = ["--quiet", "--schedule", made.TWO_SCALES, "--set", "fusion.min_agreeing_views=2"]
 CYCLES = 4
-
-
-@pytest.fixture(scope="module")
-def program() -> str:
-    """The command line, which `ffi-tests/test` builds before."""
-    found = os.environ.get("SKEP", str(ROOT / "target/release/skep"))
-    if not os.path.isfile(found):
-        message = f"{found} is missing; `cargo build --release --features cli` makes it"
-        pytest.fail(message) if os.environ.get("CI") else pytest.skip(message)
-    return found
 
 
 @pytest.fixture(scope="module")
