@@ -1,5 +1,5 @@
-//! Sets the SONAME of the shared library, writes the file with the version that `cargo cinstall` installs, and
-//! takes a fingerprint of the source, by which runs in a folder know the program that began them.
+//! Sets the SONAME of the shared library, writes the file with the version that `cargo cinstall` installs,
+//! and takes a fingerprint of the source, by which runs in a folder know the program that began them.
 
 use std::hash::{DefaultHasher, Hasher};
 use std::path::Path;

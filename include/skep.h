@@ -2154,15 +2154,14 @@ skep_status skep_result_write_workspace(const struct skep_result *result,
 
 /**
  * Writes a cloud as binary PLY (x, y, z, normals, colors), and the views of each point beside it in
- * FILE.vis, as COLMAP does. x, y and z are float, or double where floats cannot hold the distances of the points, as
- * with geographic coordinates.
+ * FILE.vis, as COLMAP does. x, y and z are float, or double where floats cannot hold the distances of the
+ * points, as with geographic coordinates.
  *
  * @param cloud  The cloud.
  * @param file   Path of the file.
  * @retval SKEP_ERR_FILE  A file that cannot be written.
  */
-skep_status skep_cloud_write_ply(const struct skep_cloud *cloud,
-                                 const char *file);
+skep_status skep_cloud_write_ply(const struct skep_cloud *cloud, const char *file);
 
 /**
  * Writes a depth map in COLMAP's layout.
@@ -2293,8 +2292,8 @@ skep_status skep_read_consistency_graph(const char *file,
  *                            SKEP_TASK_FUSE
  *
  * A task that is done, or of a cycle that the run skips, succeeds at once. The results are files in the
- * folder, which is a COLMAP workspace: stereo/, preview/, fused.ply. The options of the group "output" choose
- * among them.
+ * folder, which is a COLMAP workspace: stereo/, preview/, fused.ply. The options of the group "output"
+ * choose among them.
  */
 
 /**
@@ -2345,12 +2344,13 @@ typedef struct skep_job_needs {
 } skep_job_needs;
 
 /**
- * Plans the run of a COLMAP scene in a folder, which is created. A run of the same photographs, model,
+ * Plans the run of a scene in files in a folder, which is created. A run of the same photographs, model,
  * options and version that began there goes on; anything else begins anew, and skep_job_get_notice tells
- * why. The options "threads", "memory" and "simd" may change. No other process can work on the run while the job
- * exists.
+ * why. The options "threads", "memory" and "simd" may change. No other process can work on the run while the
+ * job exists.
  *
- * @param scene            Path of the folder with images/ and a COLMAP model in sparse/ or sparse/0/.
+ * @param scene            Path of the folder with images/ and a COLMAP model in sparse/ or sparse/0/, or of a
+ *                         scene of another program, whose formats docs/formats.md lists.
  * @param near             Smallest depth of every view in world units; 0 with `far` 0 derives the ranges.
  * @param far              Largest depth of every view in world units.
  * @param options_or_null  The options, copied; NULL: the default preset.

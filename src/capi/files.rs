@@ -113,8 +113,8 @@ pub unsafe extern "C" fn skep_result_write_workspace(
 }
 
 /// Writes a cloud as binary PLY (x, y, z, normals, colors), and the views of each point beside it in
-/// FILE.vis, as COLMAP does. x, y and z are float, or double where floats cannot hold the distances of the points, as
-/// with geographic coordinates.
+/// FILE.vis, as COLMAP does. x, y and z are float, or double where floats cannot hold the distances of the
+/// points, as with geographic coordinates.
 ///
 /// @param cloud  The cloud.
 /// @param file   Path of the file.

@@ -23,8 +23,8 @@ use std::ffi::{c_char, c_void};
 ///                            SKEP_TASK_FUSE
 ///
 /// A task that is done, or of a cycle that the run skips, succeeds at once. The results are files in the
-/// folder, which is a COLMAP workspace: stereo/, preview/, fused.ply. The options of the group "output" choose
-/// among them.
+/// folder, which is a COLMAP workspace: stereo/, preview/, fused.ply. The options of the group "output"
+/// choose among them.
 pub struct skep_job {
     job: Job,
 }
@@ -54,12 +54,13 @@ pub struct skep_job_needs {
     pub cpu_seconds: f64,
 }
 
-/// Plans the run of a COLMAP scene in a folder, which is created. A run of the same photographs, model,
+/// Plans the run of a scene in files in a folder, which is created. A run of the same photographs, model,
 /// options and version that began there goes on; anything else begins anew, and skep_job_get_notice tells
-/// why. The options "threads", "memory" and "simd" may change. No other process can work on the run while the job
-/// exists.
+/// why. The options "threads", "memory" and "simd" may change. No other process can work on the run while the
+/// job exists.
 ///
-/// @param scene            Path of the folder with images/ and a COLMAP model in sparse/ or sparse/0/.
+/// @param scene            Path of the folder with images/ and a COLMAP model in sparse/ or sparse/0/, or of a
+///                         scene of another program, whose formats docs/formats.md lists.
 /// @param near             Smallest depth of every view in world units; 0 with `far` 0 derives the ranges.
 /// @param far              Largest depth of every view in world units.
 /// @param options_or_null  The options, copied; NULL: the default preset.

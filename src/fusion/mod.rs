@@ -169,7 +169,7 @@ pub(crate) fn fuse_input(
     input: &dyn FusionInput,
     options: &FusionOptions,
     progress: ProgressFn,
-    emit: &mut dyn FnMut(&PointCloud) -> Result<()>,
+    emit: Emit,
 ) -> Result<()> {
     let count = input.len();
     let used: Vec<Used> = (0..count).map(|view| Used::none_of(input.camera(view).pixels())).collect();

@@ -4,20 +4,20 @@ use crate::scene::{SparsePoint, Tracks, nearest_views};
 use glam::DVec3;
 use std::cmp::Ordering;
 
-/// Views that a view is compared with: a surface that as many photographs show is averaged well enough, and the
-/// maps of all of them must be in memory at the same time.
+/// Views that a view is compared with: a surface that as many photographs show is averaged well enough, and
+/// the maps of all of them must be in memory at the same time.
 const MOST_VIEWS: usize = 24;
 /// Views that it is compared with also if all of them have as many as that already.
 const LEAST_VIEWS: usize = 8;
 
-/// For each view those that are compared with it, ascending: those that saw a sparse point together with it; of
-/// more than 24 those with the most common points. A view that saw none with any other may see the surfaces of
-/// all others: it is compared with the nearest ones. The overlap of two views is mutual, so that a surface gives
-/// the same points whichever of them is the reference first.
+/// For each view those that are compared with it, ascending: those that saw a sparse point together with it;
+/// of more than 24 those with the most common points. A view that saw none with any other may see the
+/// surfaces of all others: it is compared with the nearest ones. The overlap of two views is mutual, so that
+/// a surface gives the same points whichever of them is the reference first.
 ///
-/// `centers` are the camera centers of all views; a point's views must be below their number. Of sparse points
-/// with long tracks, more than 33 views, only a part of the pairs of views is taken where all points together
-/// have more than 16 million pairs; two views with many common points overlap in any case.
+/// `centers` are the camera centers of all views; a point's views must be below their number. Of sparse
+/// points with long tracks, more than 33 views, only a part of the pairs of views is taken where all points
+/// together have more than 16 million pairs; two views with many common points overlap in any case.
 pub fn overlaps(centers: &[DVec3], points: &[SparsePoint]) -> Vec<Vec<u32>> {
     let mut pairs = pairs(centers, points);
     // The best first: each pair is taken while both of its views have room for it.
@@ -59,8 +59,8 @@ impl Pair {
     }
 }
 
-/// The pairs of views that share sparse points, and of those that share none with any other view, the pairs with
-/// the nearest ones.
+/// The pairs of views that share sparse points, and of those that share none with any other view, the pairs
+/// with the nearest ones.
 fn pairs(centers: &[DVec3], points: &[SparsePoint]) -> Vec<Pair> {
     let views = centers.len();
     let tracks = Tracks::new(views, points);

@@ -11,8 +11,8 @@ use std::collections::HashMap;
 /// Points of the result that are given out at a time.
 const PART: usize = 1 << 14;
 
-/// Parts of space, each of many blocks of voxels. Those that fit into memory are averaged at a time, in a pass
-/// over the points: memory is bounded, and the order of the result does not depend on it.
+/// Parts of space, each of many blocks of voxels. Those that fit into memory are averaged at a time, in a
+/// pass over the points: memory is bounded, and the order of the result does not depend on it.
 const PARTS: usize = 256;
 /// Voxels along the side of a block, all of one part: the result stays together in space.
 const BLOCK: f64 = 64.0;
@@ -50,17 +50,12 @@ pub(super) fn thin(mut cloud: PointCloud, options: &FusionOptions) -> Result<Poi
 }
 
 /// Gives `emit` one point for each voxel of this size that has any: means of position and color, the
-/// normalized mean of the normals, and all views. The order is by parts of space, in each by the first point of
-/// the voxel. Takes about `memory` bytes; more where a single part has more points than fit.
+/// normalized mean of the normals, and all views. The order is by parts of space, in each by the first point
+/// of the voxel. Takes about `memory` bytes; more where a single part has more points than fit.
 ///
 /// # Errors
 /// Points that cannot be read; what `emit` returns.
-pub(crate) fn thin_by_voxels(
-    cloud: &dyn CloudSource,
-    size: f64,
-    memory: usize,
-    emit: &mut dyn FnMut(&PointCloud) -> Result<()>,
-) -> Result<()> {
+pub(crate) fn thin_by_voxels(cloud: &dyn CloudSource, size: f64, memory: usize, emit: Emit) -> Result<()> {
     let mut counts = [0usize; PARTS];
     cloud.each_part(&mut |points| {
         points.positions.iter().for_each(|&position| counts[part(position, size)] += 1);
@@ -87,7 +82,7 @@ fn average_parts(
     cloud: &dyn CloudSource,
     size: f64,
     parts: std::ops::Range<usize>,
-    emit: &mut dyn FnMut(&PointCloud) -> Result<()>,
+    emit: Emit,
 ) -> Result<()> {
     // By part, in the order of the first points; the table tells the place of a voxel.
     let mut voxels: Vec<Vec<Voxel>> = parts.clone().map(|_| Vec::new()).collect();
@@ -178,11 +173,7 @@ fn part(position: [f64; 3], size: f64) -> usize {
 ///
 /// # Errors
 /// Points that cannot be read; what `emit` returns.
-pub(crate) fn draw(
-    cloud: &dyn CloudSource,
-    count: usize,
-    emit: &mut dyn FnMut(&PointCloud) -> Result<()>,
-) -> Result<()> {
+pub(crate) fn draw(cloud: &dyn CloudSource, count: usize, emit: Emit) -> Result<()> {
     // Knuth's selection sampling: each point with the chance of those that are still wanted among those left.
     let (mut wanted, mut left) = (count.min(cloud.len()), cloud.len());
     cloud.each_part(&mut |points| {

@@ -2,8 +2,8 @@
 
 use glam::DVec2;
 
-/// How a lens displaces the image of a ray. Coordinates are those of an ideal pinhole image at focal length 1,
-/// `x / z` and `y / z`; the parameters are those of OpenCV and COLMAP.
+/// How a lens displaces the image of a ray. Coordinates are those of an ideal pinhole image at focal length
+/// 1, `x / z` and `y / z`; the parameters are those of OpenCV and COLMAP.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Distortion {
     /// Radial as a quotient of polynomials in r^2, and tangential:

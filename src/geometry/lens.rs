@@ -31,8 +31,8 @@ impl Lens {
         }
     }
 
-    /// The pixel of the photograph that shows the ray of a pixel of a pinhole camera with the same pose; `None`
-    /// where the lens shows none.
+    /// The pixel of the photograph that shows the ray of a pixel of a pinhole camera with the same pose;
+    /// `None` where the lens shows none.
     pub fn pixel_of(&self, pinhole: &Camera, pixel: DVec2) -> Option<DVec2> {
         let ideal = pinhole.ray(pixel).truncate();
         let shown = match self.distortion {

@@ -6,7 +6,7 @@ const START_OF_IMAGE: u8 = 0xd8;
 const END_OF_IMAGE: u8 = 0xd9;
 const START_OF_SCAN: u8 = 0xda;
 
-/// Whether the first image of the file goes on to its end-of-image marker; what follows is not read. Images in
+/// Whether the first image of the file has its end-of-image marker; what follows is not read. Images in
 /// segments, such as thumbnails, do not count. `false` for what is no JPEG file.
 ///
 /// ```text

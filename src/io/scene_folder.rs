@@ -89,8 +89,8 @@ pub fn read_scene(folder: &Path, depth_range: Option<DepthRange>) -> Result<Scen
 /// binary model in `sparse/`. A name need not end in `.png`: readers of pictures look at the content.
 ///
 /// # Errors
-/// A view whose name leads outside the folder, or is also that of a folder of another view; a file that cannot
-/// be written.
+/// A view whose name leads outside the folder, or is also that of a folder of another view; a file that
+/// cannot be written.
 pub fn write_scene(folder: &Path, scene: &Scene) -> Result<()> {
     for (index, view) in scene.views().iter().enumerate() {
         if !stays_inside(&view.name) {

@@ -47,7 +47,8 @@ impl Workspace {
         self.write_view_files(name, camera, result, &ViewFiles { status: false, ..ViewFiles::ALL })
     }
 
-    /// The same for the files that are wanted; the status of each pixel is an 8-bit gray PNG of the numbers of
+    /// The same for the files that are wanted; the status of each pixel is an 8-bit gray PNG of the numbers
+    /// of
     /// [`PixelStatus`](crate::PixelStatus).
     ///
     /// # Errors

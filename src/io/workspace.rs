@@ -157,8 +157,9 @@ impl Workspace {
         write_visibility(&visibility_path(path), &cloud.views)
     }
 
-    /// Writes a scene for programs for Gaussian splatting into a folder: `images/`, linked, and `sparse/0/` with
-    /// a model and `points3D.ply`, both with the points of the cloud. `photographs` is the folder of the images.
+    /// Writes a scene for programs for Gaussian splatting into a folder: `images/`, linked, and `sparse/0/`
+    /// with a model and `points3D.ply`, both with the points of the cloud. `photographs` is the folder of the
+    /// images.
     ///
     /// # Errors
     /// A file that cannot be written.

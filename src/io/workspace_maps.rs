@@ -116,8 +116,8 @@ impl WorkspaceMaps {
         has_photograph.then(|| self.scene.read_picture(name, camera)).transpose()
     }
 
-    /// Checks that every depth map has its normal map and that all files have their cameras' sizes, from their
-    /// headers: what does not fit is found now and not in the middle of a fusion.
+    /// Checks that every depth map has its normal map and that all files have their cameras' sizes, from
+    /// their headers: what does not fit is found now and not in the middle of a fusion.
     ///
     /// # Errors
     /// A file that is missing or of another size, named.

@@ -8,19 +8,19 @@ use glam::DVec3;
 /// What a run takes from a scene in files. Scenes in memory are taken as they are, but for the bounds.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct InputOptions {
-    /// Largest side of the photographs; larger ones are reduced, and the maps have their reduced size. 0 keeps
-    /// all pixels.
+    /// Largest side of the photographs; larger ones are reduced, and the maps have their reduced size. 0
+    /// keeps all pixels.
     pub max_image_size: u32,
     /// The photographs to take, all if empty: names or patterns with `*` and `?`, separated by commas, or the
     /// path of a text file with one on each line.
     pub images: String,
-    /// Folder of masks, none if empty: `NAME.png` or `NAME` with another ending for the photograph `NAME`; 0 is
-    /// ignored.
+    /// Folder of masks, none if empty: `NAME.png` or `NAME` with another ending for the photograph `NAME`; 0
+    /// is ignored.
     pub masks: String,
     /// Whether pixels of alpha 0 are ignored like masked ones.
     pub alpha_mask: bool,
-    /// File with the source views of each view, in the layout of COLMAP's `patch-match.cfg`; they are chosen by
-    /// triangulation angle if empty.
+    /// File with the source views of each view, in the layout of COLMAP's `patch-match.cfg`; they are chosen
+    /// by triangulation angle if empty.
     pub sources: String,
     /// The box of the world in which surfaces are reconstructed: `x0 y0 z0 x1 y1 z1`; everything if empty.
     pub bounds: String,
@@ -48,8 +48,8 @@ impl TextEntry {
 pub(super) const NUMBERS: &[Entry] = &[
     Entry {
         c_name: c"input.max_image_size",
-        explanation: "Largest side of the photographs of a scene in files: larger ones are reduced, and the maps \
-                      have their reduced size. 0 keeps all pixels.",
+        explanation: "Largest side of the photographs of a scene in files: larger ones are reduced, and the \
+                      maps have their reduced size. 0 keeps all pixels.",
         unit: "pixels",
         kind: Kind::Count { min: 0, max: 32_768 },
         get: |options| f64::from(options.input.max_image_size),
@@ -69,8 +69,8 @@ pub(super) const NUMBERS: &[Entry] = &[
 pub(super) const TEXTS: &[TextEntry] = &[
     TextEntry {
         c_name: c"input.images",
-        explanation: "The photographs to take: names or patterns with * and ?, separated by commas, or the path \
-                      of a text file with one on each line; all if empty.",
+        explanation: "The photographs to take: names or patterns with * and ?, separated by commas, or the \
+                      path of a text file with one on each line; all if empty.",
         unit: "text",
         get: |options| options.input.images.clone(),
         set: |options, text| set(&mut options.input.images, text),
@@ -85,8 +85,8 @@ pub(super) const TEXTS: &[TextEntry] = &[
     },
     TextEntry {
         c_name: c"input.sources",
-        explanation: "File with the source views of each view, in the layout of COLMAP's patch-match.cfg; chosen \
-                      by triangulation angle if empty.",
+        explanation: "File with the source views of each view, in the layout of COLMAP's patch-match.cfg; \
+                      chosen by triangulation angle if empty.",
         unit: "path",
         get: |options| options.input.sources.clone(),
         set: |options, text| set(&mut options.input.sources, text),

@@ -215,8 +215,8 @@ impl Stepper {
     }
 
     /// The result of a view after the last cycle: averages validated planes across views, fills small gaps
-    /// where the sources confirm them, removes speckles, and determines view set, cost (mean of 1 - NCC) and status of every
-    /// pixel. Reads the published surfaces of the view's sources, and their checked planes.
+    /// where the sources confirm them, removes speckles, and determines view set, cost (mean of 1 - NCC) and
+    /// status of every pixel. Reads the published surfaces of the view's sources, and their checked planes.
     ///
     /// # Errors
     /// A view that does not exist; estimates that are not of full size, or whose scene or view does not match

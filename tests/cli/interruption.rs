@@ -27,7 +27,8 @@ pub(super) fn results(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     all.map(|path| (path.clone(), std::fs::read(folder.join(path)).unwrap())).collect()
 }
 
-/// Whether the tests, and so the commands they start, ignore a signal: `nohup` and `&` of scripts ask for that.
+/// Whether the tests, and so the commands they start, ignore a signal: `nohup` and `&` of scripts ask for
+/// that.
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

@@ -91,6 +91,9 @@ pub struct Run {
     pub messages: Messages,
 }
 
+/// The numbers of a box.
+const CORNERS: [&str; 6] = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"];
+
 /// What is taken from the scene.
 #[derive(Args)]
 pub struct Input {
@@ -111,7 +114,7 @@ pub struct Input {
     #[arg(long, value_name = "FILE")]
     sources: Option<String>,
     /// Box of the world in which surfaces are reconstructed
-    #[arg(long, num_args = 6, value_names = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"], allow_negative_numbers = true)]
+    #[arg(long, num_args = 6, value_names = CORNERS, allow_negative_numbers = true)]
     bounds: Option<Vec<f64>>,
 }
 
@@ -353,10 +356,10 @@ Examples:
   skep info sigma_color             explanation of one option
   skep help reconstruct             input and output files, and remedies of failures
 
-Lines of --progress json: phase (read, search, check, fusion), done (0 to 1), seconds_left (null at first), view
-(the one that is worked on, from 0; several may be at the same time), views (their number), cycle (from 0) and
-downscale of its scale, both null except in search and check; or message. Warnings and errors are lines that
-begin with `warning: ` and `error: `.
+Lines of --progress json: phase (read, search, check, fusion), done (0 to 1), seconds_left (null at first),
+view (the one that is worked on, from 0; several may be at the same time), views (their number), cycle (from
+0) and downscale of its scale, both null except in search and check; or message. Warnings and errors are lines
+that begin with `warning: ` and `error: `.
 
 Exit status: 0 done, 1 failed, 2 wrong arguments; interrupted: 130 by Ctrl-C (SIGINT), 143 by SIGTERM,
 129 by SIGHUP. A second signal ends the program at once. Signals that are ignored when it starts, as

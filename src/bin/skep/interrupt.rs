@@ -13,8 +13,8 @@ const STATUS_BASE: u8 = 128;
 pub struct Interrupt(Arc<AtomicU8>);
 
 impl Interrupt {
-    /// Installs the handlers of Ctrl-C, SIGTERM and SIGHUP, except for those that are ignored: `nohup` and the
-    /// `&` of a script ask for that. Before, the signals end the process at once, which is harmless while
+    /// Installs the handlers of Ctrl-C, SIGTERM and SIGHUP, except for those that are ignored: `nohup` and
+    /// the `&` of a script ask for that. Before, the signals end the process at once, which is harmless while
     /// nothing has been written; after, the second signal does.
     pub fn watch() -> Interrupt {
         let received = Arc::new(AtomicU8::new(0));
@@ -50,8 +50,8 @@ mod system {
     use std::sync::atomic::{AtomicU8, Ordering};
     use std::time::{Duration, Instant};
 
-    /// A signal so soon after the first is the same one: some terminals and wrappers send it to the process and
-    /// to its group.
+    /// A signal so soon after the first is the same one: some terminals and wrappers send it to the process
+    /// and to its group.
     const SAME_SIGNAL: Duration = Duration::from_millis(500);
 
     /// Stores the first signal; the second one ends the process.

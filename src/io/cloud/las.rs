@@ -109,7 +109,8 @@ fn descriptor(name: &str) -> [u8; DESCRIPTOR_BYTES] {
     bytes
 }
 
-/// Offset and scale of an axis: round numbers, of a resolution that the spacing asks for and the range allows.
+/// Offset and scale of an axis: round numbers, of a resolution that the spacing asks for and the range
+/// allows.
 fn transform(min: f64, max: f64, spacing: f64) -> Transform {
     let round_to = |value: f64, step: f64| (value / step).round() * step;
     let size = max - min;

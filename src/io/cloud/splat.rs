@@ -8,9 +8,9 @@ use crate::io::files::link_or_copy;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Writes `images/` (hard links where the file system can), and in `sparse/0/` a binary model whose points are
-/// those of the cloud, and `points3D.ply` with the same points, positions as floats. The photographs are taken
-/// from the folder `photographs`; one that is not there is left out. Returns the files.
+/// Writes `images/` (hard links where the file system can), and in `sparse/0/` a binary model whose points
+/// are those of the cloud, and `points3D.ply` with the same points, positions as floats. The photographs are
+/// taken from the folder `photographs`; one that is not there is left out. Returns the files.
 ///
 /// # Errors
 /// A file that cannot be written.

@@ -39,8 +39,8 @@ impl MapFormat {
 /// Writes a map of `channels` numbers for each pixel, 1 or 3, row by row from the top.
 ///
 /// # Errors
-/// Another number of channels; values that do not fill the size; a format that this build does not have; a file
-/// that cannot be written.
+/// Another number of channels; values that do not fill the size; a format that this build does not have; a
+/// file that cannot be written.
 ///
 /// # Examples
 /// ```
