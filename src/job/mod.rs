@@ -183,11 +183,7 @@ impl Job {
     /// The views whose files the tasks of a view read, ascending: its own, its sources, and those whose
     /// source it is.
     pub fn views_read_by(&self, view: usize) -> Vec<usize> {
-        let sources = self.stepper.sources(view).iter().chain(self.stepper.readers(view));
-        let mut read: Vec<usize> = sources.map(|&other| other as usize).chain([view]).collect();
-        read.sort_unstable();
-        read.dedup();
-        read
+        self.stepper.views_read_by(view)
     }
 
     /// What the run needs.

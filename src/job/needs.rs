@@ -130,6 +130,15 @@ fn largest_task(scene: &Scene, stepper: &Stepper) -> u64 {
     (0..scene.views().len()).map(of_view).max().unwrap_or(0)
 }
 
+/// Bytes of the estimates that are worth keeping. Views that follow each other in the list mostly have each
+/// other as sources: what a task reads and the tasks before it wrote is read again by the next ones, and the
+/// rest seldom before the next cycle.
+fn useful_estimates(scene: &Scene, stepper: &Stepper, tasks: u64) -> u64 {
+    let largest = scene.views().iter().map(|view| view.camera.pixels() as u64).max().unwrap_or(0);
+    let read = (0..stepper.views()).map(|view| stepper.views_read_by(view).len()).max().unwrap_or(0) as u64;
+    (read + 2 * tasks) * largest * (PLANE_BYTES + SURFACE_BYTES)
+}
+
 /// What a run needs, and how it divides its memory.
 pub(super) fn needs(
     scene: &Scene,
@@ -163,7 +172,7 @@ pub(super) fn needs(
         least,
         tasks: tasks as usize,
         images: images as usize,
-        estimates: (rest - images) as usize,
+        estimates: (rest - images).min(useful_estimates(scene, stepper, tasks)) as usize,
         fusion: memory.saturating_sub(base + fusion) as usize,
     };
     let work: f64 = (0..scene.views().len())

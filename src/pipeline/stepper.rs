@@ -256,6 +256,17 @@ impl Stepper {
         self.0.readers(view)
     }
 
+    /// The views whose estimates the stages of a view read, ascending: its own, its sources, and those whose
+    /// source it is.
+    #[cfg(feature = "io")]
+    pub(crate) fn views_read_by(&self, view: usize) -> Vec<usize> {
+        let others = self.sources(view).iter().chain(self.readers(view));
+        let mut read: Vec<usize> = others.map(|&other| other as usize).chain([view]).collect();
+        read.sort_unstable();
+        read.dedup();
+        read
+    }
+
     pub(super) fn context(&self) -> &RunContext {
         &self.0
     }
