@@ -18,10 +18,9 @@
 //! use skep::{Options, PixelStatus, Progress};
 //! use std::ops::ControlFlow;
 //!
-//! // Or Scene::new from pictures and cameras in memory.
-//! let scene = skep::io::read_scene("SCENE".as_ref(), None)?;
 //! let mut options = Options::default();
 //! options.check.min_consistent_views = 3;
+//! let scene = skep::import::read_scene("SCENE".as_ref(), None, &options)?; // or Scene::new
 //! let progress = |at: &Progress| {
 //!     eprintln!("{:.0} %", at.done * 100.0);
 //!     ControlFlow::Continue(()) // Break cancels

@@ -159,3 +159,19 @@ pub(crate) fn changed(mut options: Options, change: impl FnOnce(&mut Options)) -
     change(&mut options);
     options
 }
+
+/// A scene of photographs with these names, which have no files and no points.
+#[cfg(feature = "io")]
+pub(crate) fn source_scene(names: &[&str]) -> crate::import::SourceScene {
+    let photograph = |&name: &&str| {
+        let lens = crate::geometry::Lens { camera: camera(0.0, (8, 6)), distortion: None };
+        crate::import::SourcePhotograph::new(name.to_owned(), name.into(), lens)
+    };
+    crate::import::SourceScene {
+        origin: "a test".to_owned(),
+        photographs: names.iter().map(photograph).collect(),
+        points: Vec::new(),
+        workspace: None,
+        warnings: Vec::new(),
+    }
+}

@@ -26,7 +26,7 @@ int main(int argc, char **argv) try {
     }
     // The model's cameras and depth ranges, with pictures that OpenCV reads.
     const std::string folder = argv[1];
-    const skep::Scene model = skep::Scene::read_colmap(folder);
+    const skep::Scene model = skep::Scene::read(folder);
     skep::Scene scene;
     for (std::uint32_t view = 0; view < model.view_count(); ++view) {
         const std::string name = model.name(view);

@@ -24,7 +24,7 @@ pictures = places[1] if len(places) > 1 else Path("pictures")
 pictures.mkdir(parents=True, exist_ok=True)
 
 # %% The scene: photographs, cameras and sparse points
-scene = skep.Scene.read_colmap(folder)
+scene = skep.Scene.read(folder)
 for view in range(len(scene)):
     near, far = scene.depth_range(view)
     print(

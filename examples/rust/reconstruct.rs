@@ -1,6 +1,7 @@
 //! A scene folder in, maps and a cloud out: `cargo run --release --example reconstruct -- SCENE DENSE`.
 
-use skep::io::{SceneFolder, Workspace, read_scene};
+use skep::import::read_scene;
+use skep::io::{SceneFolder, Workspace};
 use skep::{Options, PixelStatus, Progress};
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -23,11 +24,11 @@ fn main() -> ExitCode {
 }
 
 fn reconstruct(folder: &Path, dense: &Path) -> skep::Result<()> {
-    let scene = read_scene(folder, None)?;
     // Options are fields, and have names too.
     let mut options = Options { seed: 1, ..Options::default() };
     options.fusion.min_agreeing_views = 2;
     options.set("check.depth_tolerance", "0.01")?;
+    let scene = read_scene(folder, None, &options)?;
 
     let result = skep::reconstruct(&scene, &options, &show)?;
     eprintln!();

@@ -27,8 +27,8 @@ fn main() -> ExitCode {
 }
 
 fn run(folder: &Path) -> skep::Result<PointCloud> {
-    let scene = skep::io::read_scene(folder, None)?;
     let options = Options::default();
+    let scene = skep::import::read_scene(folder, None, &options)?;
     let stepper = Stepper::new(&scene, &options)?;
     for view in 0..stepper.views() {
         println!("{} has the source views {:?}", scene.views()[view].name, stepper.sources(view));

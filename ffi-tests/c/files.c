@@ -19,7 +19,7 @@ static skep_scene *check_scene(const char *folder, const scene *made, const skep
     path_in(place, folder, "scene");
     REQUIRE(skep_scene_write_colmap(handed_in, place));
     skep_scene *read = NULL;
-    REQUIRE(skep_scene_read_colmap(place, 0, 0, &read));
+    REQUIRE(skep_scene_read(place, NULL, 0, 0, &read));
     for (uint32_t view = 0; view < made->views; ++view) {
         uint32_t width = 0, height = 0;
         skep_camera camera;
@@ -49,7 +49,7 @@ static skep_scene *check_scene(const char *folder, const scene *made, const skep
     }
     skep_scene *ranged = NULL;
     double near_by = 0, far_away = 0;
-    REQUIRE(skep_scene_read_colmap(place, 1.5, 7, &ranged));
+    REQUIRE(skep_scene_read(place, NULL, 1.5, 7, &ranged));
     REQUIRE(skep_scene_get_depth_range(ranged, 1, &near_by, &far_away));
     CHECK(near_by == 1.5 && far_away == 7, "%g to %g", near_by, far_away);
     skep_scene_destroy(ranged);

@@ -92,7 +92,7 @@ void test_scene() {
     FAILS(SKEP_ERR_ARGUMENT, "view", scene.set_depth_range(9, {1, 2}));
     FAILS(SKEP_ERR_ARGUMENT, "56 x 42", scene.set_mask(0, skep::Map<std::uint8_t>({5, 4})));
     FAILS(SKEP_ERR_ARGUMENT, "2 channel", scene.set_mask(0, skep::Map<std::uint8_t>({56, 42}, 2)));
-    FAILS(SKEP_ERR_FILE, "nowhere", skep::Scene::read_colmap("nowhere"));
+    FAILS(SKEP_ERR_FILE, "nowhere", skep::Scene::read("nowhere"));
 }
 
 void test_moves() {
@@ -195,7 +195,7 @@ void test_run(const std::string &folder) {
     MUST(cloud.write_ply(folder + "/cloud.ply"));
     MUST(scene.write_colmap(folder));
     MUST(result.write_workspace(scene, folder));
-    CHECK(MUST(MUST(skep::Scene::read_colmap(folder, {2, 12})).view_count()) == 5);
+    CHECK(MUST(MUST(skep::Scene::read(folder, {2, 12})).view_count()) == 5);
     FAILS(SKEP_ERR_ARGUMENT, "view", result.depth(5, skep::Maps::Raw));
 }
 

@@ -41,13 +41,13 @@ def test_a_scene_folder_comes_back_as_it_was_written(tmp_path):
     scene = made.scene()
     scene.add_points(*made.points())
     scene.write_colmap(tmp_path)
-    read = skep.Scene.read_colmap(tmp_path)
+    read = skep.Scene.read(tmp_path)
     assert len(read) == len(scene)
     for view in range(len(read)):
         assert read.name(view) == scene.name(view) and read.size(view) == scene.size(view)
         np.testing.assert_allclose(read.camera(view).K, scene.camera(view).K, atol=1e-9)
         np.testing.assert_allclose(read.camera(view).t, scene.camera(view).t, atol=1e-9)
-    assert skep.Scene.read_colmap(tmp_path, (1.0, 8.0)).depth_range(3) == (1.0, 8.0)
+    assert skep.Scene.read(tmp_path, (1.0, 8.0)).depth_range(3) == (1.0, 8.0)
 
 
 def test_a_workspace_holds_the_maps_and_the_cloud(tmp_path, result, scene):

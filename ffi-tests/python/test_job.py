@@ -15,7 +15,7 @@ def folder(tmp_path):
 
 def test_a_run_in_a_folder_goes_on_after_an_exception_and_gives_the_bits_of_a_run_in_memory(folder):
     options = made.options()
-    read = skep.Scene.read_colmap(folder / "scene")
+    read = skep.Scene.read(folder / "scene")
     skep.reconstruct(read, options).cloud.write_ply(folder / "expected.ply")
 
     class Enough(Exception):

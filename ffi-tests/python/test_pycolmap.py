@@ -58,7 +58,7 @@ def reconstruction(pycolmap, folder):
 
 def test_a_reconstruction_becomes_a_scene(reconstruction, folder):
     scene = skep.from_pycolmap(reconstruction, folder / "images")
-    read = skep.Scene.read_colmap(folder)
+    read = skep.Scene.read(folder)
     assert len(scene) == len(read) == len(made.PLACES)
     for view, photograph in enumerate(made.photographs()):
         assert scene.name(view) == read.name(view) == f"{view}.png"
@@ -106,7 +106,7 @@ def test_pycolmap_fuses_our_workspace(pycolmap, reconstruction, folder, tmp_path
 def test_the_board_is_read_as_pycolmap_reads_it(pycolmap):
     board = pycolmap.Reconstruction(os.path.join(BOARD, "sparse"))
     scene = skep.from_pycolmap(board, os.path.join(BOARD, "images"))
-    read = skep.Scene.read_colmap(BOARD)
+    read = skep.Scene.read(BOARD)
     by_name = {read.name(view): view for view in range(len(read))}
     assert len(scene) == len(read) == len(by_name)
     for view in range(len(scene)):

@@ -108,7 +108,7 @@ def test_errors_have_kinds_statuses_and_words():
         scene.set_depth_range(77, (1.0, 2.0))
     assert isinstance(caught.value, skep.Error) and caught.value.status == -2 and "77" in str(caught.value)
     with pytest.raises(OSError, match="nowhere") as missing:
-        skep.Scene.read_colmap("/nowhere")
+        skep.Scene.read("/nowhere")
     assert isinstance(missing.value, skep.FileError) and missing.value.status == -5
     for wrong in (-1, 1 << 32):
         with pytest.raises(skep.ArgumentError, match="view is"):

@@ -29,12 +29,13 @@ class Scene : public detail::Handle<skep_scene, skep_scene_destroy> {
         Scene scene(nullptr);
         return detail::give(skep_scene_copy(get(), scene.put()), scene);
     }
-    /// (0, 0) takes the depth ranges from the sparse points.
-    static Fallible<Scene> read_colmap(const std::string &folder, DepthRange range = {}) {
+    /// A scene of any format that skep_scene_read reads; (0, 0) takes the depth ranges from it. Of the
+    /// options input.*, threads and memory count.
+    static Fallible<Scene> read(const std::string &path, DepthRange range = {},
+                                const skep_options *options = nullptr) {
         Scene scene(nullptr);
         return detail::give(
-            skep_scene_read_colmap(folder.c_str(), range.near_depth, range.far_depth, scene.put()),
-            scene);
+            skep_scene_read(path.c_str(), options, range.near_depth, range.far_depth, scene.put()), scene);
     }
     Fallible<void> write_colmap(const std::string &folder) const {
         return detail::give(skep_scene_write_colmap(get(), folder.c_str()));

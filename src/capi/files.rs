@@ -1,51 +1,66 @@
-//! Files for C programs: COLMAP scenes in, maps, clouds and whole dense folders out.
+//! Files for C programs: scenes in, maps, clouds and whole dense folders out.
 
 use super::cloud::skep_cloud;
 use super::image::check_size;
 use super::maps;
-use super::pointers::{get, give_list, out, path, slice, wanted};
+use super::options::{options_or_default, skep_options};
+use super::pointers::{self, get, give_list, out, path, slice, wanted};
 use super::result::skep_result;
 use super::scene::skep_scene;
 use super::status::{Failure, guard, skep_status};
 use crate::error::Error;
 use crate::geometry::DepthRange;
+use crate::import;
 use crate::io::{self, Workspace};
 use crate::memory::require_memory;
 use crate::scene::View;
 use std::ffi::c_char;
 use std::path::Path;
 
-/// Reads a scene from a folder with images/ and a COLMAP model in sparse/ or sparse/0/, as `colmap
-/// image_undistorter` writes it: text or binary, cameras PINHOLE or SIMPLE_PINHOLE, images PNG or JPEG.
+/// Reads a scene of any format that skep_job_plan reads: a COLMAP workspace or model with any lens, text or
+/// binary, nerfstudio's transforms.json, OpenMVS, MVSNet, OpenSfM, Middlebury. Photographs are undistorted;
+/// the options `input.*` choose, reduce and mask them. Uses threads of its own, as many as the option
+/// `threads` says.
 ///
-/// @param folder     Path of the folder, in the bytes of the file system.
-/// @param near       Smallest depth of every view in world units; 0 with `far` 0 derives the ranges from the
-///                   sparse points.
-/// @param far        Largest depth of every view in world units.
-/// @param scene_out  Receives the scene; destroy it with skep_scene_destroy.
-/// @retval SKEP_ERR_ARGUMENT  Not 0 < near < far, or a scene that skep_scene_validate refuses.
+/// @param path             Path of the scene, a folder or a file, in the bytes of the file system.
+/// @param options_or_null  Options, of which `input.*`, `threads` and `memory` count; NULL for the defaults.
+/// @param near             Smallest depth of every view in world units; 0 with `far` 0 derives the ranges from
+///                         the scene.
+/// @param far              Largest depth of every view in world units.
+/// @param scene_out        Receives the scene; destroy it with skep_scene_destroy. skep_scene_get_warning
+///                         tells what was found out while it was read.
+/// @retval SKEP_ERR_ARGUMENT  Not 0 < near < far, a choice that fits no photograph, or a scene that
+///                            skep_scene_validate refuses.
 /// @retval SKEP_ERR_FILE      A file that is missing or cannot be used; the text names the file, the line
 ///                            where there is one, and what was expected.
+/// @retval SKEP_ERR_MEMORY    Photographs that do not fit.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn skep_scene_read_colmap(
-    folder: *const c_char,
+pub unsafe extern "C" fn skep_scene_read(
+    path: *const c_char,
+    options_or_null: *const skep_options,
     near: f64,
     far: f64,
     scene_out: *mut *mut skep_scene,
 ) -> skep_status {
     guard(|| {
         // SAFETY: as the header demands of the caller.
-        let (folder, out) = unsafe { (path(folder, "folder")?, out(scene_out, "scene_out")?) };
+        let (path, options, out) = unsafe {
+            (
+                pointers::path(path, "path")?,
+                options_or_default(options_or_null)?,
+                out(scene_out, "scene_out")?,
+            )
+        };
         let range = (near != 0.0 || far != 0.0).then_some(DepthRange { near, far });
         if let Some(range) = range {
             range.check("depth range")?;
         }
-        out.give(skep_scene::new(io::read_scene(folder, range)?));
+        out.give(skep_scene::new(import::read_scene(path, range, &options)?));
         Ok(())
     })
 }
 
-/// Writes a scene as a folder that COLMAP and skep_scene_read_colmap read: images as PNG files under the
+/// Writes a scene as a folder that COLMAP and skep_scene_read read: images as PNG files under the
 /// names of their views in images/, and a binary model in sparse/. A name need not end in .png: readers of
 /// images look at the content.
 ///

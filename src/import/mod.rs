@@ -6,11 +6,16 @@
 //! | step | file |
 //! |---|---|
 //! | find out what a path is, and read it | `formats.rs`, one file for each format |
-//! | choose the photographs | `selection.rs` |
+//! | choose the photographs | `selection.rs`, `source_lists.rs`, `depth_ranges.rs` |
 //! | undistort, reduce and mask a photograph | `photograph.rs` |
 //! | write the workspace, once | `prepare.rs` |
+//! | or take all into memory | `memory.rs` |
 
+mod changes;
+mod chosen;
+mod depth_ranges;
 mod formats;
+mod memory;
 mod photograph;
 mod prepare;
 mod record;
@@ -21,6 +26,7 @@ use crate::geometry::{DepthRange, Lens};
 use crate::io::SceneFolder;
 use crate::scene::SparsePoint;
 pub use formats::read;
+pub use memory::read_scene;
 pub(crate) use prepare::{Extra, Prepared, prepare};
 use std::path::PathBuf;
 
@@ -54,11 +60,21 @@ pub struct SourcePhotograph {
     pub depth_range: Option<DepthRange>,
     /// The photographs to match it with, as indices, the best first, where the file says so.
     pub sources: Option<Vec<u32>>,
+    /// Whether it gets maps; others are only source views.
+    pub is_reference: bool,
 }
 
 impl SourcePhotograph {
     /// A photograph of which nothing else is known.
     pub fn new(name: String, path: PathBuf, lens: Lens) -> SourcePhotograph {
-        SourcePhotograph { name, path, lens, mask: None, depth_range: None, sources: None }
+        SourcePhotograph {
+            name,
+            path,
+            lens,
+            mask: None,
+            depth_range: None,
+            sources: None,
+            is_reference: true,
+        }
     }
 }

@@ -1,17 +1,13 @@
 //! The workspace of a run from a scene of any program: photographs without distortion, small enough, with
 //! masks, and a model of pinhole cameras. What is there already and still right is not made again.
 
+use super::changes::{Changes, read};
 use super::photograph::Change;
 use super::record::{Entry, Record};
-use super::selection::select;
-use super::source_lists::read_source_lists;
-use super::{SourcePhotograph, SourceScene, formats};
+use super::{SourcePhotograph, SourceScene, chosen};
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
-use crate::io::{
-    ColmapModel, ModelImage, SceneFolder, cannot_be_read, deep_picture_from_bytes, largest_value,
-    link_or_copy, opaque_pixels, picture_from_bytes, picture_header, read_mask, write_mask, write_photograph,
-};
+use crate::io::{ColmapModel, ModelImage, SceneFolder, link_or_copy, write_mask, write_photograph};
 use crate::io::{Fingerprint, fingerprint, fingerprint_file};
 use crate::memory::{memory_budget, require_memory};
 use crate::options::{InputOptions, Options};
@@ -40,6 +36,8 @@ pub(crate) struct Extra {
     pub mask: Option<PathBuf>,
     pub depth_range: Option<crate::geometry::DepthRange>,
     pub sources: Option<Vec<u32>>,
+    /// Whether it gets no maps.
+    pub is_source_only: bool,
 }
 
 /// Reads the scene at a path. One that is a COLMAP workspace already and of which everything is taken stays
@@ -54,60 +52,39 @@ pub(crate) fn prepare(
     folder: &Path,
     progress: ProgressFn,
 ) -> Result<Prepared> {
-    let (memory, options) = (memory_budget(options.memory), &options.input);
-    let mut source = formats::read(scene)?;
-    if !options.sources.is_empty() {
-        read_source_lists(&mut source, Path::new(&options.sources))?;
-    }
-    select(&mut source, &options.images)?;
-    if !options.masks.is_empty() {
-        find_masks(&mut source, Path::new(&options.masks))?;
-    }
+    let source = chosen::read(scene, options)?;
     let tracker = Tracker::with_work(progress, source.photographs.len() as u64);
     let advance = |units, view| {
         let (phase, views) = (Phase::Read, source.photographs.len());
         tracker.advance(units, Progress { phase, downscale: 1, cycle: 0, view, views, done: 0.0 })
     };
     let mut warnings = source.warnings.clone();
-    let white = white_level(&source, &|view| advance(0, view))?;
-    if white != u16::MAX {
-        warnings.push(format!(
-            "the photographs have 16 bits a channel, but no value above {white}: {white} is taken as white"
-        ));
-    }
-    let import = Import { source: &source, options, folder, white };
-    let changes = import.changes()?;
-    if let Some(folder) = import.unchanged(&changes) {
+    let changes = Changes::new(&source, &options.input, &|view| advance(0, view))?;
+    warnings.extend(changes.warning());
+    let import = Import { source: &source, changes: &changes, folder };
+    if let Some(folder) = import.unchanged(&options.input) {
         return Ok(Prepared { folder, is_imported: false, extras: Vec::new(), warnings });
     }
     import.refuse_own_folder()?;
     let record = Record::read(folder);
-    let entry = |(view, change): (usize, &Change)| {
+    let entry = |view: usize| {
         advance(0, view)?;
-        let entry = import.photograph(view, change, record.get(&source.photographs[view].name))?;
+        let entry = import.photograph(view, record.get(&source.photographs[view].name))?;
         advance(1, view)?;
         Ok(entry)
     };
-    // As many at a time as fit into the memory.
-    let largest = changes.iter().map(Change::memory).max().unwrap_or(0);
-    require_memory(largest, "the change of a photograph")?;
-    let at_a_time = (memory / largest.max(1)).clamp(1, rayon::current_num_threads() as u64) as usize;
-    let numbered: Vec<(usize, &Change)> = changes.iter().enumerate().collect();
-    let in_turns = numbered.chunks(numbered.len().div_ceil(at_a_time).max(1)).collect::<Vec<_>>();
-    let one_by_one =
-        |part: &[(usize, &Change)]| part.iter().copied().map(entry).collect::<Vec<Result<Entry>>>();
-    let entries: Vec<Result<Entry>> =
-        in_turns.into_par_iter().with_max_len(1).flat_map_iter(one_by_one).collect();
+    let entries: Vec<Result<Entry>> = within_memory(&changes, memory_budget(options.memory), &entry)?;
     // What is done is noted even if the rest failed: the next call does not do it again.
     let names = source.photographs.iter().map(|photograph| photograph.name.clone());
     let done = names.zip(&entries).filter_map(|(name, entry)| Some((name, entry.as_ref().ok()?.clone())));
     Record::new(done).write(folder)?;
     let entries = entries.into_iter().collect::<Result<Vec<_>>>()?;
-    let sparse = import.write_model(&changes)?;
+    let sparse = import.write_model()?;
     let extra = |(photograph, entry): (&SourcePhotograph, &Entry)| Extra {
         mask: entry.mask.as_ref().map(|_| mask_path(folder, &photograph.name)),
         depth_range: photograph.depth_range,
         sources: photograph.sources.clone(),
+        is_source_only: !photograph.is_reference,
     };
     let extras = source.photographs.iter().zip(&entries).map(extra).collect();
     Ok(Prepared {
@@ -118,111 +95,46 @@ pub(crate) fn prepare(
     })
 }
 
+/// Does something with every photograph, as many at a time as fit into a memory while they are changed.
+///
+/// # Errors
+/// Less memory than the change of one takes.
+pub(super) fn within_memory<T: Send>(
+    changes: &Changes,
+    memory: u64,
+    work: &(dyn Fn(usize) -> T + Sync),
+) -> Result<Vec<T>> {
+    let largest = changes.shapes().iter().map(Change::memory).max().unwrap_or(0);
+    require_memory(largest, "the change of a photograph")?;
+    let at_a_time = (memory / largest.max(1)).clamp(1, rayon::current_num_threads() as u64) as usize;
+    let views: Vec<usize> = (0..changes.shapes().len()).collect();
+    let in_turns = views.chunks(views.len().div_ceil(at_a_time).max(1)).collect::<Vec<_>>();
+    let one_by_one = |part: &[usize]| part.iter().map(|&view| work(view)).collect::<Vec<T>>();
+    Ok(in_turns.into_par_iter().with_max_len(1).flat_map_iter(one_by_one).collect())
+}
+
 /// The file of a mask in a workspace, as COLMAP names it.
 pub(crate) fn mask_path(folder: &Path, name: &str) -> PathBuf {
     folder.join("masks").join(format!("{name}.png"))
 }
 
-/// Finds the mask of each photograph in a folder: the file of its name with `.png` after it, or with another
-/// ending in place of its own.
-///
-/// # Errors
-/// No such folder; a folder without a mask of any photograph.
-fn find_masks(source: &mut SourceScene, folder: &Path) -> Result<()> {
-    if !folder.is_dir() {
-        return Err(Error::argument("options.input.masks", folder.display(), "a folder with masks"));
-    }
-    for photograph in &mut source.photographs {
-        let named = folder.join(format!("{}.png", photograph.name));
-        let own = folder.join(&photograph.name);
-        let endings = ["png", "jpg", "jpeg", "tif", "tiff", "bmp"].map(|ending| own.with_extension(ending));
-        if let Some(found) = [named, own].into_iter().chain(endings).find(|path| path.is_file()) {
-            photograph.mask = Some(found);
-        }
-    }
-    let count = source.photographs.iter().filter(|photograph| photograph.mask.is_some()).count();
-    match (count, source.photographs.first()) {
-        (0, Some(first)) => {
-            let expected = format!("a folder with masks such as {}.png", first.name);
-            Err(Error::argument("options.input.masks", folder.display(), expected))
-        }
-        (count, _) if count < source.photographs.len() => {
-            let without = source.photographs.len() - count;
-            source.warnings.push(format!("{without} photographs have no mask in {}", folder.display()));
-            Ok(())
-        }
-        _ => Ok(()),
-    }
-}
-
-/// The value of white in photographs of 16 bits: the largest of the usual ones that is needed for all of
-/// them, since cameras and converters store 10, 12 or 14 bits in 16.
-fn white_level(source: &SourceScene, before: &(dyn Fn(usize) -> Result<()> + Sync)) -> Result<u16> {
-    let largest = |(view, photograph): (usize, &SourcePhotograph)| -> Result<Option<u16>> {
-        before(view)?;
-        if !photograph.path.is_file() {
-            return Err(missing(source, photograph));
-        }
-        if !picture_header(&photograph.path)?.is_deep {
-            return Ok(None);
-        }
-        let bytes = read(&photograph.path)?;
-        largest_value(&bytes, &photograph.path).map(Some)
-    };
-    let all: Vec<Option<u16>> =
-        source.photographs.par_iter().enumerate().with_max_len(1).map(largest).collect::<Result<_>>()?;
-    let Some(largest) = all.iter().flatten().max() else { return Ok(u16::MAX) };
-    let levels = [8, 10, 12, 14].map(|bits| (1u16 << bits) - 1);
-    Ok(levels.into_iter().find(|level| largest <= level).unwrap_or(u16::MAX))
-}
-
-fn missing(source: &SourceScene, photograph: &SourcePhotograph) -> Error {
-    let problem = format!("no such file; {} has a photograph of this name", source.origin);
-    Error::file(&photograph.path, problem)
-}
-
-fn read(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).map_err(|error| cannot_be_read(path, error))
-}
-
 /// What is imported into a folder.
 struct Import<'a> {
     source: &'a SourceScene,
-    options: &'a InputOptions,
+    changes: &'a Changes<'a>,
     folder: &'a Path,
-    white: u16,
 }
 
 impl Import<'_> {
-    /// How each photograph is changed.
-    ///
-    /// # Errors
-    /// A photograph that is not of its camera's size; a lens that cannot be undistorted.
-    fn changes(&self) -> Result<Vec<Change>> {
-        let change = |photograph: &SourcePhotograph| {
-            let size = picture_header(&photograph.path)?.size;
-            let Camera { width, height, .. } = photograph.lens.camera;
-            if size != (width, height) {
-                let expected = format!("{width}x{height}, the size of its camera in {}", self.source.origin);
-                let problem = format!("the picture is {}x{}; expected {expected}", size.0, size.1);
-                return Err(Error::file(&photograph.path, problem));
-            }
-            Change::new(photograph.lens, self.options.max_image_size, &photograph.name)
-        };
-        self.source.photographs.par_iter().with_max_len(1).map(change).collect()
-    }
-
     /// The scene, if it is a COLMAP workspace in which nothing is to be changed.
-    fn unchanged(&self, changes: &[Change]) -> Option<SceneFolder> {
+    fn unchanged(&self, options: &InputOptions) -> Option<SceneFolder> {
         let has_extra = |photograph: &SourcePhotograph| {
             let SourcePhotograph { mask, depth_range, sources, .. } = photograph;
             mask.is_some() || depth_range.is_some() || sources.is_some()
         };
-        let is_as_it_is = self.options.images.is_empty()
-            && !self.options.alpha_mask
-            && self.white == u16::MAX
-            && changes.iter().all(Change::is_none)
-            && !self.source.photographs.iter().any(has_extra);
+        let are_all = options.images.is_empty() && options.reference.is_empty();
+        let is_as_it_is =
+            are_all && self.changes.are_none() && !self.source.photographs.iter().any(has_extra);
         self.source.workspace.clone().filter(|_| is_as_it_is)
     }
 
@@ -249,12 +161,11 @@ impl Import<'_> {
     }
 
     /// Writes a photograph and its mask, unless they are there.
-    fn photograph(&self, view: usize, change: &Change, earlier: Option<&Entry>) -> Result<Entry> {
+    fn photograph(&self, view: usize, earlier: Option<&Entry>) -> Result<Entry> {
         let photograph = &self.source.photographs[view];
         let bytes = read(&photograph.path)?;
         let mask = photograph.mask.as_deref().map(fingerprint_file).transpose()?;
-        let (alpha, white) = (self.options.alpha_mask, self.white);
-        let made_from = format!("{:?} {change:?} {mask:?} {alpha} {white}", fingerprint(&bytes));
+        let made_from = format!("{:?} {mask:?} {}", fingerprint(&bytes), self.changes.key(view));
         let made_from = fingerprint(made_from.as_bytes());
         let to = self.folder.join("images").join(&photograph.name);
         let mask_to = mask_path(self.folder, &photograph.name);
@@ -265,23 +176,17 @@ impl Import<'_> {
         {
             return Ok(earlier.clone());
         }
-        let is_deep = white != u16::MAX && picture_header(&photograph.path)?.is_deep;
         remove(&to)?;
-        if change.is_none() && !is_deep {
-            // Decoded all the same: a damaged photograph is found now and not after hours.
-            picture_from_bytes(&bytes, &photograph.path)?;
-            link_or_copy(&photograph.path, &to)?;
-        } else {
-            let picture = match is_deep {
-                true => deep_picture_from_bytes(&bytes, &photograph.path, white)?,
-                false => picture_from_bytes(&bytes, &photograph.path)?,
-            };
-            write_photograph(&to, &change.apply(&picture)?)?;
+        // Decoded even where it stays as it is: a damaged photograph is found now and not after hours.
+        match self.changes.picture(view, &bytes)? {
+            (_, true) => link_or_copy(&photograph.path, &to)?,
+            (picture, false) => write_photograph(&to, &picture)?,
         }
         remove(&mask_to)?;
-        let mask = match self.mask(photograph, change, &bytes)? {
+        let mask = match self.changes.mask(view, &bytes)? {
             Some(mask) => {
-                write_mask(&mask_to, &mask, (change.camera.width, change.camera.height))?;
+                let Camera { width, height, .. } = self.changes.shapes()[view].camera;
+                write_mask(&mask_to, &mask, (width, height))?;
                 Some(fingerprint_file(&mask_to)?)
             }
             None => None,
@@ -289,37 +194,13 @@ impl Import<'_> {
         Ok(Entry { made_from, image: fingerprint_file(&to)?, mask })
     }
 
-    /// The mask of a changed photograph; `None` where nothing is ignored.
-    fn mask(
-        &self,
-        photograph: &SourcePhotograph,
-        change: &Change,
-        bytes: &[u8],
-    ) -> Result<Option<Vec<bool>>> {
-        let Camera { width, height, .. } = photograph.lens.camera;
-        let mut own = photograph.mask.as_deref().map(|path| read_mask(path, (width, height))).transpose()?;
-        if self.options.alpha_mask
-            && let Some(opaque) = opaque_pixels(bytes, &photograph.path, (width, height))?
-        {
-            own = Some(match own {
-                Some(mask) => mask.iter().zip(&opaque).map(|(&a, &b)| a && b).collect(),
-                None => opaque,
-            });
-        }
-        if own.is_none() && photograph.lens.distortion.is_none() {
-            return Ok(None);
-        }
-        let mask = change.mask(own.as_deref());
-        Ok((!mask.iter().all(|&is_known| is_known)).then_some(mask))
-    }
-
     /// Writes the model of the changed photographs, unless it is there; gives its folder.
-    fn write_model(&self, changes: &[Change]) -> Result<PathBuf> {
+    fn write_model(&self) -> Result<PathBuf> {
         let image = |(photograph, change): (&SourcePhotograph, &Change)| ModelImage {
             name: photograph.name.clone(),
             camera: change.camera,
         };
-        let images = self.source.photographs.iter().zip(changes).map(image).collect();
+        let images = self.source.photographs.iter().zip(self.changes.shapes()).map(image).collect();
         let model = ColmapModel { images, points: self.source.points.clone() };
         let sparse = self.folder.join("sparse");
         for name in ["cameras", "images", "points3D"] {

@@ -1,9 +1,15 @@
 //! The choice of photographs.
 
-use super::SourceScene;
+use super::{SourcePhotograph, SourceScene};
 use crate::error::{Error, Result};
+use crate::geometry::Camera;
+use crate::image::{Photograph, Picture, PictureSource};
 use crate::io::cannot_be_read;
+use crate::options::Options;
+use crate::scene::{Scene, View};
+use crate::view_selection::source_lists;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Keeps the photographs that a text chooses: names or patterns with `*` (any letters) and `?` (one letter),
 /// separated by commas, or the path of a file with one on each line. Points lose their views that are left
@@ -12,12 +18,43 @@ use std::path::Path;
 /// # Errors
 /// An entry that no photograph matches; fewer than two photographs.
 pub(super) fn select(scene: &mut SourceScene, chosen: &str) -> Result<()> {
-    if chosen.trim().is_empty() {
-        return Ok(());
+    const NAME: &str = "options.input.images";
+    let Some(is_chosen) = chosen_by(scene, chosen, NAME)? else { return Ok(()) };
+    let count = is_chosen.iter().filter(|&&is_chosen| is_chosen).count();
+    if count < 2 {
+        let value = format!("`{chosen}`, which is {count}");
+        return Err(Error::argument(NAME, value, "at least 2 photographs"));
     }
-    let entries = entries(chosen)?;
+    keep(scene, &is_chosen);
+    Ok(())
+}
+
+/// Keeps the photographs that get maps, which a text chooses like that of [`select`], and their source views.
+///
+/// # Errors
+/// An entry that no photograph matches; a scene that [`Scene::new`] refuses.
+pub(super) fn select_references(scene: &mut SourceScene, options: &Options) -> Result<()> {
+    let chosen = chosen_by(scene, &options.input.reference, "options.input.reference")?;
+    let Some(is_reference) = chosen else { return Ok(()) };
+    let lists = source_lists(&without_pixels(scene)?, options).lists;
+    let mut is_kept = is_reference.clone();
+    for (list, _) in lists.iter().zip(&is_reference).filter(|(_, is_reference)| **is_reference) {
+        list.iter().for_each(|&source| is_kept[source as usize] = true);
+    }
+    for (photograph, is_reference) in scene.photographs.iter_mut().zip(is_reference) {
+        photograph.is_reference = is_reference;
+    }
+    keep(scene, &is_kept);
+    Ok(())
+}
+
+/// The photographs that a text chooses; `None` for all.
+fn chosen_by(scene: &SourceScene, chosen: &str, name: &'static str) -> Result<Option<Vec<bool>>> {
+    if chosen.trim().is_empty() {
+        return Ok(None);
+    }
     let mut is_chosen = vec![false; scene.photographs.len()];
-    for entry in &entries {
+    for entry in &entries(chosen)? {
         let mut is_used = false;
         for (photograph, is_chosen) in scene.photographs.iter().zip(&mut is_chosen) {
             if matches(entry.as_bytes(), photograph.name.as_bytes()) {
@@ -31,20 +68,17 @@ pub(super) fn select(scene: &mut SourceScene, chosen: &str) -> Result<()> {
                 }
                 None => "names of photographs".to_owned(),
             };
-            return Err(Error::argument("options.input.images", format!("`{entry}`"), expected));
+            return Err(Error::argument(name, format!("`{entry}`"), expected));
         }
     }
+    Ok(Some(is_chosen))
+}
+
+/// Leaves out the other photographs.
+fn keep(scene: &mut SourceScene, is_kept: &[bool]) {
     let mut index = 0;
     let new_index: Vec<Option<u32>> =
-        (is_chosen.iter()).map(|&is_chosen| is_chosen.then(|| (index, index += 1).0)).collect();
-    if index < 2 {
-        let expected = "at least 2 photographs";
-        return Err(Error::argument(
-            "options.input.images",
-            format!("`{chosen}`, which is {index}"),
-            expected,
-        ));
-    }
+        is_kept.iter().map(|&is_kept| is_kept.then(|| (index, index += 1).0)).collect();
     let renumbered =
         |views: &[u32]| -> Vec<u32> { views.iter().filter_map(|&view| new_index[view as usize]).collect() };
     for point in &mut scene.points {
@@ -56,11 +90,37 @@ pub(super) fn select(scene: &mut SourceScene, chosen: &str) -> Result<()> {
     }
     scene.points.retain(|point| !point.position.is_nan());
     let mut place = 0..;
-    scene.photographs.retain(|_| place.next().is_some_and(|place| is_chosen[place]));
+    scene.photographs.retain(|_| place.next().is_some_and(|place| is_kept[place]));
     for photograph in &mut scene.photographs {
         photograph.sources = photograph.sources.as_deref().map(renumbered);
     }
-    Ok(())
+}
+
+/// The scene for questions about poses and points alone. The distortion of lenses is left out.
+fn without_pixels(scene: &SourceScene) -> Result<Scene> {
+    let view = |photograph: &SourcePhotograph| View {
+        name: photograph.name.clone(),
+        picture: Photograph::Deferred(Arc::new(NoPixels(photograph.lens.camera))),
+        camera: photograph.lens.camera,
+        mask: None,
+        depth_range: photograph.depth_range,
+        sources: photograph.sources.clone(),
+    };
+    Scene::new(scene.photographs.iter().map(view).collect(), scene.points.clone())
+}
+
+/// Stands for a photograph that nobody loads.
+#[derive(Debug)]
+struct NoPixels(Camera);
+
+impl PictureSource for NoPixels {
+    fn size(&self) -> (u32, u32) {
+        (self.0.width, self.0.height)
+    }
+
+    fn load(&self) -> Result<Picture> {
+        Err(Error::argument("photograph", "none", "one that is loaded"))
+    }
 }
 
 /// The names and patterns of a text or of the file at that path.
@@ -105,29 +165,17 @@ fn matches(pattern: &[u8], name: &[u8]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Lens;
-    use crate::import::SourcePhotograph;
+    use crate::geometry::DepthRange;
     use crate::scene::SparsePoint;
     use crate::testing;
     use glam::DVec3;
 
     fn scene() -> SourceScene {
-        let photograph = |name: &str| SourcePhotograph {
-            sources: Some(vec![0, 1, 2]),
-            ..SourcePhotograph::new(
-                name.to_owned(),
-                name.into(),
-                Lens { camera: testing::camera(0.0, (8, 6)), distortion: None },
-            )
-        };
+        let mut scene = testing::source_scene(&["a/1.jpg", "a/2.jpg", "b/1.jpg", "b/10.jpg"]);
+        scene.photographs.iter_mut().for_each(|photograph| photograph.sources = Some(vec![0, 1, 2]));
         let point = |views: &[u32]| SparsePoint { position: DVec3::ONE, views: views.to_vec() };
-        SourceScene {
-            origin: "a test".to_owned(),
-            photographs: ["a/1.jpg", "a/2.jpg", "b/1.jpg", "b/10.jpg"].map(photograph).to_vec(),
-            points: vec![point(&[0, 2, 3]), point(&[0, 1]), point(&[])],
-            workspace: None,
-            warnings: Vec::new(),
-        }
+        scene.points = vec![point(&[0, 2, 3]), point(&[0, 1]), point(&[])];
+        scene
     }
 
     fn chosen(text: &str) -> Vec<String> {
@@ -146,6 +194,25 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), "# the first folder\na/*\n").unwrap();
         assert_eq!(chosen(file.path().to_str().unwrap()), ["a/1.jpg", "a/2.jpg"]);
+    }
+
+    #[test]
+    fn references_are_kept_with_their_sources() {
+        let mut scene = scene();
+        for (view, sources) in [[1, 3], [2, 3], [3, 0], [0, 1]].into_iter().enumerate() {
+            scene.photographs[view].sources = Some(sources.to_vec());
+            scene.photographs[view].depth_range = Some(DepthRange { near: 1.0, far: 2.0 });
+        }
+        let mut options = Options::default();
+        options.set("input.reference", "b/1.jpg").unwrap();
+        select_references(&mut scene, &options).unwrap();
+        let kept: Vec<_> =
+            scene.photographs.iter().map(|own| (own.name.as_str(), own.is_reference)).collect();
+        assert_eq!(kept, [("a/1.jpg", false), ("b/1.jpg", true), ("b/10.jpg", false)]);
+        assert_eq!(scene.photographs[1].sources, Some(vec![2, 0]));
+        options.set("input.reference", "c*").unwrap();
+        let error = select_references(&mut scene, &options).unwrap_err().to_string();
+        assert!(error.contains("options.input.reference is `c*`"), "{error}");
     }
 
     #[test]

@@ -58,26 +58,10 @@ pub(super) fn read_source_lists(scene: &mut SourceScene, path: &Path) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Lens;
-    use crate::import::SourcePhotograph;
     use crate::testing;
 
     fn read(text: &str) -> Result<Vec<Option<Vec<u32>>>> {
-        let photograph = |name: &str| {
-            SourcePhotograph::new(
-                name.to_owned(),
-                name.into(),
-                Lens { camera: testing::camera(0.0, (8, 6)), distortion: None },
-            )
-        };
-        let photographs = ["a b.jpg", "c.jpg", "d.jpg"].map(photograph).to_vec();
-        let mut scene = SourceScene {
-            origin: "a test".to_owned(),
-            photographs,
-            points: Vec::new(),
-            workspace: None,
-            warnings: Vec::new(),
-        };
+        let mut scene = testing::source_scene(&["a b.jpg", "c.jpg", "d.jpg"]);
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), text).unwrap();
         read_source_lists(&mut scene, file.path())?;

@@ -41,6 +41,6 @@ pub(crate) use picture_formats::{
 pub(crate) use pictures::picture_from_bytes;
 pub use pictures::{picture_size, read_picture, write_picture};
 pub use previews::{write_depth_preview, write_fraction_preview, write_normal_preview, write_views_preview};
-pub use scene_folder::{SceneFolder, read_scene, write_scene};
+pub use scene_folder::{SceneFolder, write_scene};
 pub use workspace::{MapKind, Workspace};
 pub use workspace_maps::{WorkspaceMaps, WorkspaceView};

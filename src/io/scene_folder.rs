@@ -5,7 +5,7 @@ use super::files::{NAME_INSIDE, stays_inside};
 use super::pictures::{picture_size, read_picture, write_picture};
 use super::places::check_files;
 use crate::error::{Error, Result};
-use crate::geometry::{Camera, DepthRange};
+use crate::geometry::Camera;
 use crate::image::Picture;
 use crate::scene::{Scene, View};
 use std::path::{Path, PathBuf};
@@ -64,25 +64,6 @@ impl SceneFolder {
         }
         Ok(path)
     }
-}
-
-/// Reads a scene; `depth_range` applies to every view and is required if the model has no points.
-///
-/// # Errors
-/// A missing file or folder; the errors of [`ColmapModel::read`], [`SceneFolder::read_picture`] and
-/// [`Scene::new`].
-pub fn read_scene(folder: &Path, depth_range: Option<DepthRange>) -> Result<Scene> {
-    let scene = SceneFolder::find(folder)?;
-    if !scene.images.is_dir() {
-        return Err(Error::file(&scene.images, "no such folder; expected the photographs in it"));
-    }
-    let model = ColmapModel::read(&scene.sparse)?;
-    let view = |image: super::ModelImage| {
-        let picture = scene.read_picture(&image.name, &image.camera)?.into();
-        Ok(View { name: image.name, picture, camera: image.camera, mask: None, depth_range, sources: None })
-    };
-    let views = model.images.into_iter().map(view).collect::<Result<_>>()?;
-    Scene::new(views, model.points)
 }
 
 /// Writes a scene as a folder: its photographs as PNG files under their views' names in `images/`, and a

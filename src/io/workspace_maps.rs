@@ -2,6 +2,7 @@
 
 use super::colmap_maps::{map_size, read_depth_map};
 use super::colmap_model::ColmapModel;
+use super::files::cannot_be_read;
 use super::scene_folder::SceneFolder;
 use super::workspace::{MapKind, Workspace, require_size, sized};
 use crate::error::{Error, Result};
@@ -9,6 +10,7 @@ use crate::fusion::LoadedView;
 use crate::geometry::Camera;
 use crate::image::Picture;
 use crate::scene::{Maps, SparsePoint};
+use std::collections::HashSet;
 
 /// A view of a workspace.
 #[derive(Debug, Clone)]
@@ -17,7 +19,9 @@ pub struct WorkspaceView {
     pub name: String,
     /// Its camera.
     pub camera: Camera,
-    /// Whether there is a depth map.
+    /// Whether `stereo/fusion.cfg` lists it, or is missing.
+    pub is_listed: bool,
+    /// Whether it is listed and there is a depth map.
     pub has_maps: bool,
     /// Whether there is a photograph.
     pub has_photograph: bool,
@@ -62,14 +66,18 @@ impl WorkspaceMaps {
 
 impl Workspace {
     /// Finds the maps of all views of the scene: the geometric maps when any view has one, else the
-    /// photometric ones, never a mixture. Reads the model only.
+    /// photometric ones, never a mixture. Views that `stereo/fusion.cfg` does not list, where there is one,
+    /// are left out as COLMAP leaves them out: they have no maps. Reads the model only.
     ///
     /// # Errors
-    /// The errors of [`ColmapModel::read`]; no view with maps.
+    /// The errors of [`ColmapModel::read`]; a list that cannot be read or that names no image of the model;
+    /// no view with maps.
     pub fn maps(&self, scene: &SceneFolder) -> Result<WorkspaceMaps> {
         let ColmapModel { images, points } = ColmapModel::read(&scene.sparse)?;
         let kinds = [MapKind::Validated, MapKind::Raw];
-        let has_map = |name: &str, kind| self.depth_map(name, kind).is_file();
+        let listed = self.read_fusion_list(&images)?;
+        let is_listed = |name: &str| listed.as_ref().is_none_or(|listed| listed.contains(name));
+        let has_map = |name: &str, kind| is_listed(name) && self.depth_map(name, kind).is_file();
         let Some(kind) =
             kinds.into_iter().find(|&kind| images.iter().any(|image| has_map(&image.name, kind)))
         else {
@@ -77,6 +85,7 @@ impl Workspace {
             return Err(Error::file(self.folder(), format!("no depth maps; expected files like {wanted}")));
         };
         let view = |image: super::ModelImage| WorkspaceView {
+            is_listed: is_listed(&image.name),
             has_maps: has_map(&image.name, kind),
             has_photograph: scene.images.join(&image.name).is_file(),
             name: image.name,
@@ -84,6 +93,27 @@ impl Workspace {
         };
         let views = images.into_iter().map(view).collect();
         Ok(WorkspaceMaps { views, points, kind, workspace: self.clone(), scene: scene.clone() })
+    }
+
+    /// The names in `stereo/fusion.cfg`; `None` without the file.
+    fn read_fusion_list(&self, images: &[super::ModelImage]) -> Result<Option<HashSet<String>>> {
+        let path = self.folder().join("stereo").join("fusion.cfg");
+        if !path.is_file() {
+            return Ok(None);
+        }
+        let text = std::fs::read_to_string(&path).map_err(|error| cannot_be_read(&path, error))?;
+        let known: HashSet<&str> = images.iter().map(|image| image.name.as_str()).collect();
+        let mut listed = HashSet::new();
+        for (number, line) in (1..).zip(text.lines().map(str::trim)) {
+            if line.is_empty() || line.starts_with('#') {
+                continue;
+            }
+            if !known.contains(line) {
+                return Err(Error::line(&path, number, format!("{line:?} is no image of the model")));
+            }
+            listed.insert(line.to_owned());
+        }
+        Ok(Some(listed))
     }
 }
 

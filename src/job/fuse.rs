@@ -19,14 +19,16 @@ impl Job {
     pub(super) fn fuse_finished<'a>(&self, progress: ProgressFn<'a>) -> Result<(RunCloud<'a>, PathBuf)> {
         let path = self.workspace.cloud_as(self.options.output.cloud_format);
         let load = |index: usize| {
-            let view = &self.scene.views()[index];
+            let view = &self.scene.views()[self.references[index]];
             let (maps, confidence) = self.workspace.read_finished(&view.name, &view.camera)?;
             Ok(LoadedView { maps, confidence: Some(confidence), picture: Some(view.picture.load()?) })
         };
-        let cameras = self.scene.views().iter().map(|view| &view.camera).collect();
+        let cameras = self.references.iter().map(|&view| &self.scene.views()[view].camera).collect();
         let views = StreamedViews::new(cameras, &self.overlaps, &load, self.shares.fusion);
         let memory = self.needs.memory.saturating_sub(self.shares.least.base);
-        let made = cloud::make(views, &self.options, (&path, memory), &mut |points| points, progress)?;
+        let numbers: Vec<u32> = self.references.iter().map(|&view| view as u32).collect();
+        let mut change = |points: PointCloud| points.renumbered(&numbers);
+        let made = cloud::make(views, &self.options, (&path, memory), &mut change, progress)?;
         Ok((made, path))
     }
 }
@@ -79,7 +81,7 @@ fn fuse_on_pool(
     let used: Vec<usize> = (0..maps.views.len()).filter(|&view| maps.views[view].has_maps).collect();
     let cameras: Vec<_> = used.iter().map(|&view| &maps.views[view].camera).collect();
     let centers: Vec<DVec3> = cameras.iter().map(|camera| camera.center()).collect();
-    let overlaps = overlaps(&centers, &points_of(maps, &used));
+    let overlaps = overlaps(&centers, &points_of(&maps.points, &used, maps.views.len()));
     let least = BASE + needs::point_bytes(&maps.points) + streamed_bytes(&cameras, &overlaps);
     let memory = memory_budget(options.memory);
     if memory < least {
@@ -124,13 +126,13 @@ fn fuse_on_pool(
     Ok(FusedWorkspace { points, points_without_color, pixels, depths: depths.into_inner() })
 }
 
-/// The sparse points with the views' places in `used`; other views are left out.
-fn points_of(maps: &WorkspaceMaps, used: &[usize]) -> Vec<SparsePoint> {
-    let mut places = vec![None; maps.views.len()];
+/// The sparse points with the places of their views in `used`; of `views` in all, the others are left out.
+pub(super) fn points_of(points: &[SparsePoint], used: &[usize], views: usize) -> Vec<SparsePoint> {
+    let mut places = vec![None; views];
     used.iter().enumerate().for_each(|(place, &view)| places[view] = Some(place as u32));
     let renumbered = |point: &SparsePoint| SparsePoint {
         position: point.position,
         views: point.views.iter().filter_map(|&view| places[view as usize]).collect(),
     };
-    maps.points.iter().map(renumbered).collect()
+    points.iter().map(renumbered).collect()
 }

@@ -46,6 +46,9 @@ pub(super) struct PhotographEntry {
     /// Its source views, if the scene says so.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sources: Option<Vec<u32>>,
+    /// Whether it gets no maps.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub is_source_only: bool,
 }
 
 impl PhotographEntry {
@@ -147,7 +150,7 @@ impl Manifest {
             after.iter().filter(|(name, content)| before.get(*name).is_some_and(|old| old != *content));
         let changed = changed.map(|(name, entry)| {
             let is_other = before.get(name).is_some_and(|old| old.content != entry.content);
-            format!("{} {name}", if is_other { "photograph" } else { "mask, depth range or sources of" })
+            format!("{} {name}", if is_other { "photograph" } else { "mask, depth range, sources or use of" })
         });
         let added = after
             .keys()
@@ -198,7 +201,14 @@ mod tests {
     fn manifest() -> Manifest {
         let photograph = |name: &str| {
             let content = fingerprint(name.as_bytes());
-            PhotographEntry { name: name.to_owned(), content, mask: None, depth_range: None, sources: None }
+            PhotographEntry {
+                name: name.to_owned(),
+                content,
+                mask: None,
+                depth_range: None,
+                sources: None,
+                is_source_only: false,
+            }
         };
         let photographs = ["a.png", "b.png"].map(photograph).to_vec();
         Manifest::new(&ColmapModel::default(), photographs, None, &Options::default())

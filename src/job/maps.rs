@@ -27,6 +27,9 @@ pub fn check_maps(folder: &Path, scene: &SceneFolder) -> Result<Vec<String>> {
     let (workspace, files) =
         (Workspace::new(folder.root()), manifest.options(&Options::default())?.output.write);
     let damaged = |(view, image): (usize, &ModelImage)| {
+        if manifest.photographs.get(view).is_some_and(|photograph| photograph.is_source_only) {
+            return None;
+        }
         let Some(record) = Record::read(&folder, run, Task::Finish { view }) else {
             return Some(format!("{} is not finished: its maps may be of another run", image.name));
         };

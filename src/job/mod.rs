@@ -35,12 +35,14 @@ use crate::scene::Scene;
 use cloud::CloudScene;
 use estimates::Estimates;
 use folder::{Access, Lock, RunFolder};
+use fuse::points_of;
 pub use fuse::{FusedWorkspace, fuse_workspace};
 use glam::DVec3;
 use manifest::Manifest;
 pub use maps::check_maps;
 pub use needs::Needs;
 use needs::{Least, Shares};
+use plan::Plan;
 pub use run::Summary;
 use std::path::{Path, PathBuf};
 use task::{Content, Record};
@@ -68,7 +70,9 @@ pub struct Job {
     stepper: Stepper,
     run: u64,
     estimates: Estimates,
-    /// By view, the views that the fusion compares it with.
+    /// The views that get maps, ascending.
+    references: Vec<usize>,
+    /// By reference, the references that the fusion compares it with, as places in their list.
     overlaps: Vec<Vec<u32>>,
     needs: Needs,
     shares: Shares,
@@ -106,11 +110,11 @@ impl Job {
         let pool = JoinedPool::new(useful_threads(options.threads, usize::MAX))?;
         let prepared = pool.install(|| prepare(scene, options, folder.root(), progress))?;
         let plan = pool.install(|| plan::read(&prepared, depth_range, options, &folder, progress))?;
-        let run = plan.manifest.run();
-        let mut job = pool.install(|| Job::new(folder, plan.scene, options, run, lock))?;
+        let manifest = plan.manifest.clone();
+        let mut job = pool.install(|| Job::new(folder, plan, options, lock))?;
         job.needs.require(job.needs.least_memory)?;
         // Last: a run that cannot begin leaves the folder as it was.
-        job.notices = plan::prepare(&job.folder, &prepared.folder, &job.scene, &plan.manifest, fresh)?;
+        job.notices = plan::prepare(&job.folder, &prepared.folder, &manifest, fresh)?;
         job.notices.splice(..0, prepared.warnings);
         job.lock.keep();
         Ok(job)
@@ -134,15 +138,20 @@ impl Job {
         let lock = folder.lock(Access::Tasks)?;
         let scene = plan::read_planned(&folder, &manifest, &options)?;
         let pool = JoinedPool::new(thread_count(&scene, &options))?;
-        pool.install(|| Job::new(folder, scene, &options, manifest.run(), lock))
+        pool.install(|| Job::new(folder, Plan { scene, manifest }, &options, lock))
     }
 
-    fn new(folder: RunFolder, scene: Scene, options: &Options, run: u64, lock: Lock) -> Result<Job> {
+    fn new(folder: RunFolder, plan: Plan, options: &Options, lock: Lock) -> Result<Job> {
+        let Plan { scene, manifest } = plan;
+        let run = manifest.run();
         // The first stepper knows the source views, from which the limit of the images follows.
         let planned = Stepper::with_image_limit(&scene, options, 0)?;
-        let centers: Vec<DVec3> = scene.views().iter().map(|view| view.camera.center()).collect();
-        let overlaps = overlaps(&centers, scene.points());
-        let (needs, shares) = needs::needs(&scene, options, &planned, &overlaps);
+        let is_reference = |&view: &usize| !manifest.photographs[view].is_source_only;
+        let references: Vec<usize> = (0..scene.views().len()).filter(is_reference).collect();
+        let centers: Vec<DVec3> =
+            references.iter().map(|&view| scene.views()[view].camera.center()).collect();
+        let overlaps = overlaps(&centers, &points_of(scene.points(), &references, scene.views().len()));
+        let (needs, shares) = needs::needs(&scene, options, &planned, (&references, &overlaps));
         let estimates = Estimates::new(&folder, run, shares.estimates);
         Ok(Job {
             workspace: Workspace::new(folder.root()),
@@ -152,6 +161,7 @@ impl Job {
             scene,
             run,
             estimates,
+            references,
             overlaps,
             needs,
             shares,
@@ -178,6 +188,11 @@ impl Job {
     /// The folder, with the results once they are written.
     pub fn workspace(&self) -> &Workspace {
         &self.workspace
+    }
+
+    /// The views that get maps, ascending: all, unless the option `input.reference` chooses them.
+    pub fn references(&self) -> &[usize] {
+        &self.references
     }
 
     /// The views whose files the tasks of a view read, ascending: its own, its sources, and those whose
@@ -291,10 +306,12 @@ impl Job {
         }
     }
 
-    /// Whether the task is of a cycle that does not run.
+    /// Whether the task is of a cycle that does not run, or the end of a view that gets no maps.
     fn is_needless(&self, task: Task) -> bool {
-        let (Task::Search { cycle, .. } | Task::Check { cycle, .. } | Task::Next { cycle }) = task else {
-            return false;
+        let cycle = match task {
+            Task::Search { cycle, .. } | Task::Check { cycle, .. } | Task::Next { cycle } => cycle,
+            Task::Finish { view } => return self.references.binary_search(&view).is_err(),
+            Task::Fuse => return false,
         };
         let (decided, is_all) = self.decided_cycles();
         !decided.contains(&cycle) && (is_all || decided.last().is_some_and(|&last| cycle < last))

@@ -144,14 +144,14 @@ pub(super) fn needs(
     scene: &Scene,
     options: &Options,
     stepper: &Stepper,
-    overlaps: &[Vec<u32>],
+    (references, overlaps): (&[usize], &[Vec<u32>]),
 ) -> (Needs, Shares) {
     let threads = thread_count(scene, options);
     let pixels: u64 = scene.views().iter().map(|view| view.camera.pixels() as u64).sum();
     let task = largest_task(scene, stepper);
     let base = BASE + point_bytes(scene.points());
     // With a bit of each pixel of all views, which of many views is more than another task takes.
-    let cameras: Vec<_> = scene.views().iter().map(|view| &view.camera).collect();
+    let cameras: Vec<_> = references.iter().map(|&view| &scene.views()[view].camera).collect();
     let fusion = streamed_bytes(&cameras, overlaps);
     let least = Least { base, view: task, fusion };
     let memory = memory_budget(options.memory);
@@ -184,7 +184,9 @@ pub(super) fn needs(
             units as f64 * stepper.sources(view).len() as f64
         })
         .sum();
-    let disk = pixels * (view_file_bytes(&options.output.write) + ESTIMATE_BYTES + cloud_bytes(options));
+    let written: u64 = cameras.iter().map(|camera| camera.pixels() as u64).sum();
+    let disk =
+        pixels * ESTIMATE_BYTES + written * (view_file_bytes(&options.output.write) + cloud_bytes(options));
     let least_memory = base + task.max(fusion);
     (Needs { least_memory, memory, disk, cpu_seconds: work * SECONDS_PER_UNIT }, shares)
 }

@@ -66,13 +66,15 @@ pub(super) fn read(
             picture_from_bytes(&bytes, &path)?;
         }
         advance(1, view)?;
-        let Extra { mask, depth_range, sources } = prepared.extras.get(view).cloned().unwrap_or_default();
+        let extra = prepared.extras.get(view).cloned().unwrap_or_default();
+        let Extra { mask, depth_range, sources, is_source_only } = extra;
         Ok(PhotographEntry {
             name: image.name.clone(),
             content: fingerprint(&bytes),
             mask: mask.as_deref().map(fingerprint_file).transpose()?,
             depth_range: depth_range.map(|range| [range.near, range.far]),
             sources,
+            is_source_only,
         })
     };
     let photographs: Vec<_> =
@@ -139,7 +141,6 @@ fn scene(folder: &SceneFolder, model: ColmapModel, manifest: &Manifest) -> Resul
 pub(super) fn prepare(
     folder: &RunFolder,
     source: &SceneFolder,
-    scene: &Scene,
     manifest: &Manifest,
     fresh: bool,
 ) -> Result<Vec<String>> {
@@ -175,7 +176,8 @@ pub(super) fn prepare(
     }
     adopt(folder, source, manifest)?;
     let workspace = Workspace::new(folder.root());
-    workspace.write_lists(scene.views().iter().map(|view| view.name.as_str()))?;
+    let references = manifest.photographs.iter().filter(|photograph| !photograph.is_source_only);
+    workspace.write_lists(references.map(|photograph| photograph.name.as_str()))?;
     if !(goes_on && is_same) {
         manifest.write(&folder.manifest())?;
     }

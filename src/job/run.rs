@@ -69,7 +69,8 @@ impl Job {
             Some(Content::Finish(summary)) => Ok(summary),
             _ => Err(Error::file(self.folder.record(Task::Finish { view }), NOT_COMPLETE)),
         };
-        let views = (0..self.stepper.views()).map(summary).collect::<Result<_>>()?;
+        let mut views = vec![ViewSummary::default(); self.stepper.views()];
+        self.references.iter().try_for_each(|&view| summary(view).map(|found| views[view] = found))?;
         let points = match self.record(Task::Fuse).map(|record| record.content) {
             Some(Content::Fuse(points)) => points,
             _ => return Err(Error::file(self.folder.record(Task::Fuse), NOT_COMPLETE)),
@@ -102,7 +103,9 @@ impl Job {
             cycles[..before].iter().map(checked).sum()
         };
         let work_before = |cycle: usize| SEARCH_UNITS * self.stepper.work_before(cycle) + checks(cycle);
-        let total = work_before(cycles.len()) + (FINISH_UNITS + FUSE_UNITS) * pixels;
+        let of_view = |view: usize| self.scene.views()[view].camera.pixels() as u64;
+        let finished: u64 = self.references.iter().map(|&view| of_view(view)).sum();
+        let total = work_before(cycles.len()) + FINISH_UNITS * finished + FUSE_UNITS * pixels;
         let meter = Meter::new(progress, total);
         loop {
             // Cycles that are decided are done: their estimates may be gone.
@@ -124,9 +127,8 @@ impl Job {
             after_cycle(cycle)?;
             self.run_task(Task::Next { cycle }, progress)?;
         }
-        let of_view = |view: usize| self.scene.views()[view].camera.pixels() as u64;
         let finish = |view| (Task::Finish { view }, FINISH_UNITS * of_view(view));
-        self.run_counted((0..self.stepper.views()).map(finish).collect(), &meter)?;
+        self.run_counted(self.references.iter().map(|&view| finish(view)).collect(), &meter)?;
         self.run_counted(vec![(Task::Fuse, FUSE_UNITS * pixels)], &meter)?;
         self.remove_temporaries();
         Ok(())
@@ -159,11 +161,11 @@ impl Job {
         let last = decided[decided.len() - 1];
         let views = || 0..self.stepper.views();
         // Once all views are finished no task needs estimates, and after the fusion they are gone.
-        let is_finished = views().all(|view| self.record(Task::Finish { view }).is_some());
+        let is_finished = self.references.iter().all(|&view| self.record(Task::Finish { view }).is_some());
         let is_complete = is_finished && self.record(Task::Fuse).is_some();
         let before = self.cycle_before(last)?;
         let mut inputs: Vec<Task> = Vec::new();
-        let mut current: Vec<Task> = views().map(|view| Task::Finish { view }).collect();
+        let mut current: Vec<Task> = self.references.iter().map(|&view| Task::Finish { view }).collect();
         current.push(Task::Fuse);
         if !is_finished && is_all {
             inputs.extend(views().map(|view| Task::Check { cycle: last, view }));

@@ -96,8 +96,8 @@ pub(super) enum Content {
     Fuse(usize),
 }
 
-/// The counts of a finished view.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// The counts of a finished view; empty for one that gets no maps.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ViewSummary {
     /// Number of pixels of each status, in the order of [`PixelStatus::ALL`].
     pub status_counts: [u64; PixelStatus::ALL.len()],

@@ -14,6 +14,9 @@ pub struct InputOptions {
     /// The photographs to take, all if empty: names or patterns with `*` and `?`, separated by commas, or the
     /// path of a text file with one on each line.
     pub images: String,
+    /// The photographs that get maps, all if empty, in the same form. Of the others a run takes only their
+    /// source views, which the checks need, without writing their maps.
+    pub reference: String,
     /// Folder of masks, none if empty: `NAME.png` or `NAME` with another ending for the photograph `NAME`; 0
     /// is ignored.
     pub masks: String,
@@ -22,6 +25,9 @@ pub struct InputOptions {
     /// File with the source views of each view, in the layout of COLMAP's `patch-match.cfg`; they are chosen
     /// by triangulation angle if empty.
     pub sources: String,
+    /// File with depth ranges of views: lines `NAME NEAR FAR`; those of other views follow from the points.
+    /// None if empty.
+    pub depth_ranges: String,
     /// The box of the world in which surfaces are reconstructed: `x0 y0 z0 x1 y1 z1`; everything if empty.
     pub bounds: String,
 }
@@ -76,6 +82,14 @@ pub(super) const TEXTS: &[TextEntry] = &[
         set: |options, text| set(&mut options.input.images, text),
     },
     TextEntry {
+        c_name: c"input.reference",
+        explanation: "The photographs that get maps, in the form of input.images; all if empty. Of the others \
+                      only their source views are taken, which get none.",
+        unit: "text",
+        get: |options| options.input.reference.clone(),
+        set: |options, text| set(&mut options.input.reference, text),
+    },
+    TextEntry {
         c_name: c"input.masks",
         explanation: "Folder of masks: NAME.png for the photograph NAME; where it is 0 nothing is estimated. \
                       None if empty.",
@@ -90,6 +104,14 @@ pub(super) const TEXTS: &[TextEntry] = &[
         unit: "path",
         get: |options| options.input.sources.clone(),
         set: |options, text| set(&mut options.input.sources, text),
+    },
+    TextEntry {
+        c_name: c"input.depth_ranges",
+        explanation: "File with depth ranges of views, lines NAME NEAR FAR; the ranges of other views follow \
+                      from the sparse points. None if empty.",
+        unit: "path",
+        get: |options| options.input.depth_ranges.clone(),
+        set: |options, text| set(&mut options.input.depth_ranges, text),
     },
     TextEntry {
         c_name: c"input.bounds",

@@ -114,7 +114,14 @@ impl Scene {
         self.outer_ranges[view]
     }
 
-    /// A sentence for each view whose depth range is neither its own nor that of sparse points it saw, and so
+    /// The scene with warnings from before it was a scene, ahead of its own.
+    #[cfg(feature = "io")]
+    pub(crate) fn with_warnings(mut self, earlier: Vec<String>) -> Scene {
+        self.warnings.splice(..0, earlier);
+        self
+    }
+
+    /// What reading it found out, then a sentence for each view whose depth range is neither its own nor that of sparse points it saw, and so
     /// may miss surfaces; a single sentence for all views where no point names a view.
     pub fn warnings(&self) -> &[String] {
         &self.warnings

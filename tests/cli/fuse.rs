@@ -89,6 +89,26 @@ fn a_view_without_maps_is_named_takes_no_memory_and_keeps_its_number() {
 }
 
 #[test]
+fn views_that_are_not_in_fusion_cfg_are_left_out_by_name() {
+    let (folder, workspace) = workspace();
+    let list = folder.path().join("stereo/fusion.cfg");
+    fs::write(&list, "1.png\n2.png\n3.png\n").unwrap();
+    let warnings = fuse(&folder, &["--quiet"]);
+    assert_eq!(
+        warnings.trim(),
+        "warning: 2 of 5 views are not in stereo/fusion.cfg and are left out: 0.png, 4.png"
+    );
+    let views = read_visibility(&folder.path().join("fused.ply.vis")).unwrap();
+    let numbers: Vec<u32> = (0..views.len()).flat_map(|point| views.get(point)).copied().collect();
+    assert!(numbers.iter().all(|number| (1..4).contains(number)) && numbers.contains(&3));
+    assert!(!read_ply(&workspace.cloud()).unwrap().positions.is_empty());
+    fs::write(&list, "1.png\n\n7.png\n").unwrap();
+    let (status, error) = failure(&["fuse", path(&folder)]);
+    assert_eq!(status, Some(1));
+    assert!(error.contains("fusion.cfg, line 3: \"7.png\" is no image of the model"), "{error}");
+}
+
+#[test]
 fn missing_photographs_are_a_warning_with_the_number_of_gray_points() {
     let (folder, workspace) = workspace();
     for view in [1, 3] {

@@ -113,6 +113,49 @@ fn photographs_are_reduced_chosen_and_masked_as_asked() {
 }
 
 #[test]
+fn only_references_get_maps_and_only_their_sources_are_taken() {
+    let (scene, output, lists) = (small_board(), TempDir::new().unwrap(), TempDir::new().unwrap());
+    let others = NAMES[1..4].join(",");
+    let (sources, ranges) = (lists.path().join("patch-match.cfg"), lists.path().join("ranges"));
+    fs::write(&sources, format!("{}\n{others}\n", NAMES[0])).unwrap();
+    fs::write(&ranges, format!("{} 0.5 1000\n", NAMES[1])).unwrap();
+    let sources = ["--sources", sources.to_str().unwrap()];
+    let arguments = ["--reference", NAMES[0], "--depth-ranges", ranges.to_str().unwrap()];
+    reconstruct(&scene, &output, &[arguments, [sources[0], sources[1], "--write", "depth"]].concat());
+
+    let maps: Vec<_> = fs::read_dir(output.path().join("stereo/depth_maps")).unwrap().flatten().collect();
+    assert!(maps.iter().all(|map| map.file_name().to_str().unwrap().starts_with(NAMES[0])), "{maps:?}");
+    assert!(!maps.is_empty());
+    let report = report(output.path());
+    let views = report["views"].as_array().unwrap();
+    let references: Vec<_> = views.iter().map(|view| view["reference"].as_bool().unwrap()).collect();
+    assert_eq!(references, [true, false, false, false], "four of seven photographs are read");
+    assert_eq!(report["totals"]["pixels"], views[0]["pixels"], "of the maps that there are");
+    assert!(validated_share(&output) > 0.4, "{}", validated_share(&output));
+    assert_eq!((views[1]["depth_min"].as_f64(), views[1]["depth_max"].as_f64()), (Some(0.5), Some(1000.0)));
+    let list = fs::read_to_string(output.path().join("stereo/fusion.cfg")).unwrap();
+    assert_eq!(list, format!("{}\n", NAMES[0]));
+    // The same command finds everything done, and the maps belong to the run.
+    let again = [&arguments[..], &sources, &["--write", "depth"]].concat();
+    assert!(reconstruct(&scene, &output, &again).contains("complete before"));
+}
+
+#[test]
+fn a_distorted_scene_is_read_into_memory_undistorted_reduced_and_chosen() {
+    let scene = small_board();
+    distort(&scene, [-0.06, 0.01]);
+    let mut options = skep::Options::default();
+    options.set("input.max_image_size", "100").unwrap();
+    options.set("input.images", &NAMES[..3].join(",")).unwrap();
+    let read = skep::import::read_scene(scene.path(), None, &options).unwrap();
+    assert_eq!(read.views().len(), 3);
+    let view = &read.views()[0];
+    assert_eq!(view.camera.width.max(view.camera.height), 100);
+    assert_eq!(view.picture.size(), (view.camera.width, view.camera.height));
+    assert!(view.picture.decoded().is_some() && !read.points().is_empty());
+}
+
+#[test]
 fn of_several_models_the_largest_is_the_run_s() {
     let (scene, output) = (small_board(), TempDir::new().unwrap());
     let sparse = scene.path().join("sparse");

@@ -3,8 +3,9 @@
 use crate::{assert_refused, model};
 use image::{ImageBuffer, Rgb};
 use skep::DepthRange;
-use skep::io::{ColmapModel, SceneFolder, read_scene, write_scene};
-use skep::{Scene, View};
+use skep::import;
+use skep::io::{ColmapModel, SceneFolder, write_scene};
+use skep::{Options, Result, Scene, View};
 use std::path::Path;
 use tempfile::tempdir;
 
@@ -16,6 +17,11 @@ pub fn write_pictures(folder: &Path, model: &ColmapModel) {
         let (width, height) = (image.camera.width, image.camera.height);
         ImageBuffer::from_pixel(width, height, Rgb([index as u8, 50, 60])).save(path).unwrap();
     }
+}
+
+/// Reads a scene with the default options.
+fn read_scene(folder: &Path, depth_range: Option<DepthRange>) -> Result<Scene> {
+    import::read_scene(folder, depth_range, &Options::default())
 }
 
 const RANGE: Option<DepthRange> = Some(DepthRange { near: 1.0, far: 9.0 });

@@ -104,6 +104,9 @@ pub struct Input {
     /// line
     #[arg(long, value_name = "NAMES|FILE")]
     images: Option<String>,
+    /// Photographs that get maps, in the same form; of the others only the source views of these are taken
+    #[arg(long, value_name = "NAMES|FILE")]
+    reference: Option<String>,
     /// Folder of masks, NAME.png for the photograph NAME: where a mask is 0, nothing is estimated
     #[arg(long, value_name = "DIR")]
     masks: Option<String>,
@@ -113,6 +116,9 @@ pub struct Input {
     /// File with the source views of each view, in the layout of COLMAP's patch-match.cfg
     #[arg(long, value_name = "FILE")]
     sources: Option<String>,
+    /// File with depth ranges of views, lines NAME NEAR FAR; other views have that of the sparse points
+    #[arg(long, value_name = "FILE")]
+    depth_ranges: Option<String>,
     /// Box of the world in which surfaces are reconstructed
     #[arg(long, num_args = 6, value_names = CORNERS, allow_negative_numbers = true)]
     bounds: Option<Vec<f64>>,
@@ -127,9 +133,11 @@ impl Input {
         let texts = [
             ("input.max_image_size", self.max_image_size.map(|size| size.to_string())),
             ("input.images", self.images.clone()),
+            ("input.reference", self.reference.clone()),
             ("input.masks", self.masks.clone()),
             ("input.alpha_mask", self.alpha_mask.then(|| true.to_string())),
             ("input.sources", self.sources.clone()),
+            ("input.depth_ranges", self.depth_ranges.clone()),
             ("input.bounds", bounds),
         ];
         texts.iter().try_for_each(|(name, text)| text.iter().try_for_each(|text| options.set(name, text)))

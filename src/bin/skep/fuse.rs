@@ -4,7 +4,7 @@ use crate::arguments::Fuse;
 use crate::interrupt::Interrupt;
 use crate::progress::Display;
 use crate::{Failure, reconstruct, streams, tasks};
-use skep::io::{SceneFolder, Workspace, WorkspaceMaps};
+use skep::io::{SceneFolder, Workspace, WorkspaceMaps, WorkspaceView};
 use skep::job::{self, FusedWorkspace, Job, Task};
 use skep::{Error, Options, Progress};
 
@@ -62,9 +62,19 @@ fn task(arguments: &Fuse, display: Display, interrupt: &Interrupt) -> Result<(),
 /// The views without maps, and the number of views without photographs.
 fn missing_files(maps: &WorkspaceMaps) -> Vec<String> {
     let views = maps.views.len();
-    let without_maps: Vec<&str> =
-        maps.views.iter().filter(|view| !view.has_maps).map(|view| view.name.as_str()).collect();
+    let named = |is_wanted: fn(&WorkspaceView) -> bool| -> Vec<&str> {
+        maps.views.iter().filter(|view| is_wanted(view)).map(|view| view.name.as_str()).collect()
+    };
+    let without_maps = named(|view| view.is_listed && !view.has_maps);
+    let left_out = named(|view| !view.is_listed);
     let mut warnings = Vec::new();
+    if !left_out.is_empty() {
+        let count = left_out.len();
+        warnings.push(format!(
+            "{count} of {views} views are not in stereo/fusion.cfg and are left out: {}",
+            listed(&left_out)
+        ));
+    }
     if !without_maps.is_empty() {
         let (count, kind) = (without_maps.len(), maps.kind.colmap_name());
         warnings.push(format!("{count} of {views} views have no {kind} maps: {}", listed(&without_maps)));

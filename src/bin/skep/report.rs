@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::Value;
 use skep::job::{Job, Summary, ViewSummary};
 use skep::simd::SimdLevel;
-use skep::{Counts, CycleRecord, OptionValue, Options, PixelStatus, Result, Scene};
+use skep::{Counts, CycleRecord, OptionValue, Options, PixelStatus, Result};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
@@ -27,7 +27,7 @@ pub struct Report {
     views: Vec<ViewReport>,
 }
 
-/// All views together.
+/// All views that got maps together.
 #[derive(Default, Serialize)]
 pub struct Totals {
     pub pixels: u64,
@@ -48,6 +48,8 @@ pub struct Totals {
 #[derive(Serialize)]
 struct ViewReport {
     name: String,
+    /// Whether it got maps; else only its photograph was used, and there are no counts.
+    reference: bool,
     width: u32,
     height: u32,
     pixels: u64,
@@ -86,7 +88,7 @@ impl Report {
             preset: preset_of(options),
             options: options.values().map(|(name, value)| (name, typed(value))).collect(),
             warnings: scene.warnings().iter().chain(&result.warnings).cloned().collect(),
-            totals: totals(scene, result),
+            totals: totals(job, result),
             phases: None,
             views,
         }
@@ -129,7 +131,7 @@ fn typed(value: OptionValue) -> Value {
     }
 }
 
-fn totals(scene: &Scene, result: &Summary) -> Totals {
+fn totals(job: &Job, result: &Summary) -> Totals {
     let mut counts = Counts::default();
     let mut status_counts = [0; PixelStatus::ALL.len()];
     let mut cycles: Vec<CycleRecord> = Vec::new();
@@ -145,7 +147,7 @@ fn totals(scene: &Scene, result: &Summary) -> Totals {
     // Coarse to fine, the order of the run.
     cycles.sort_by_key(|cycle| (std::cmp::Reverse(cycle.downscale), cycle.cycle));
     Totals {
-        pixels: scene.views().iter().map(|view| view.camera.pixels() as u64).sum(),
+        pixels: job.references().iter().map(|&view| job.scene().views()[view].camera.pixels() as u64).sum(),
         status_counts: by_name(status_counts),
         outcomes: by_name(status_counts),
         ncc_evaluations: counts.ncc_evaluations,
@@ -178,6 +180,7 @@ fn view_report(job: &Job, index: usize, result: &ViewSummary) -> ViewReport {
     let range = scene.depth_range(index);
     ViewReport {
         name: view.name.clone(),
+        reference: job.references().contains(&index),
         width: view.camera.width,
         height: view.camera.height,
         pixels: view.camera.pixels() as u64,

@@ -14,7 +14,6 @@ from ._buffers import (
     doubles,
     index,
     indices,
-    path,
     pointer,
     rows,
     take_indices,
@@ -22,6 +21,7 @@ from ._buffers import (
     text,
     until_refused,
 )
+from ._buffers import path as to_path
 from ._camera import Camera
 from ._errors import ArgumentError, check
 from ._images import Order, image as to_image
@@ -40,7 +40,7 @@ class Scene(NotPickled):
     __slots__ = ("_handle",)
 
     _handle: Any
-    _instead = "send the arguments of add_view, or a folder of write_colmap for read_colmap"
+    _instead = "send the arguments of add_view, or a folder of write_colmap for read"
 
     def __init__(self) -> None:
         out = ffi.new("skep_scene **")
@@ -48,16 +48,20 @@ class Scene(NotPickled):
         self._handle = ffi.gc(out[0], lib.skep_scene_destroy)
 
     @classmethod
-    def read_colmap(
-        cls, folder: str | os.PathLike[str], depth_range: tuple[float, float] | None = None
+    def read(
+        cls,
+        path: str | os.PathLike[str],
+        depth_range: tuple[float, float] | None = None,
+        options: Options | None = None,
     ) -> Scene:
-        """Reads a folder with images/ and a COLMAP model in sparse/ or sparse/0/.
+        """Reads a scene of any format into memory: COLMAP, nerfstudio, OpenMVS, MVSNet, OpenSfM, Middlebury.
 
-        `depth_range` is that of every view; None derives it from the sparse points.
+        `depth_range` is that of every view; None derives it from the scene. Photographs are undistorted; the
+        options `input.*` choose, reduce and mask them. `warnings` has what was found out.
         """
         near, far = depth_range or (0.0, 0.0)
         out = ffi.new("skep_scene **")
-        check(lib.skep_scene_read_colmap(path(folder, "folder"), near, far, out))
+        check(lib.skep_scene_read(to_path(path, "path"), _options.handle(options), near, far, out))
         return cls._of(out)
 
     @classmethod
@@ -75,8 +79,8 @@ class Scene(NotPickled):
         return self.__copy__()
 
     def write_colmap(self, folder: str | os.PathLike[str]) -> None:
-        """Writes a folder that COLMAP and `read_colmap` read; photographs are PNG files whatever their names."""
-        check(lib.skep_scene_write_colmap(self._handle, path(folder, "folder")))
+        """Writes a folder that COLMAP and `read` read; photographs are PNG files whatever their names."""
+        check(lib.skep_scene_write_colmap(self._handle, to_path(folder, "folder")))
 
     def add_view(
         self,
