@@ -8,7 +8,7 @@
  *   in folders  skep_job_plan, skep_job_run: runs larger than memory, resumed, divided among machines
  *   kernels     skep_plane_homographies, skep_patch_ncc: stateless
  *
- * and files: skep_scene_read_colmap, skep_result_write_workspace and others, for programs without a parser.
+ * and files: skep_scene_read, skep_result_write_workspace and others, for programs without a parser.
  *
  * Rules for all functions:
  *   - Status: a call returns SKEP_OK or a negative status; skep_last_error then returns the argument that was
@@ -260,12 +260,20 @@ size_t skep_last_error(char *buffer, size_t capacity);
  *       The photographs to take: names or patterns with * and ?, separated by commas, or the path of a text
  *       file with one on each line; all if empty.
  *       default:
+ *   input.reference
+ *       The photographs that get maps, in the form of input.images; all if empty. Of the others only their
+ *       source views are taken, which get none.
+ *       default:
  *   input.masks
  *       Folder of masks: NAME.png for the photograph NAME; where it is 0 nothing is estimated. None if empty.
  *       default:
  *   input.sources
  *       File with the source views of each view, in the layout of COLMAP's patch-match.cfg; chosen by
  *       triangulation angle if empty.
+ *       default:
+ *   input.depth_ranges
+ *       File with depth ranges of views, lines NAME NEAR FAR; the ranges of other views follow from the
+ *       sparse points. None if empty.
  *       default:
  *   input.bounds
  *       Box of the world in which surfaces are reconstructed, x0 y0 z0 x1 y1 z1; everything if empty.
@@ -2106,25 +2114,32 @@ skep_status skep_patch_ncc(const struct skep_ncc_window *window,
 /* ---- Files --------------------------------------------------------------------------------------------- */
 
 /**
- * Reads a scene from a folder with images/ and a COLMAP model in sparse/ or sparse/0/, as `colmap
- * image_undistorter` writes it: text or binary, cameras PINHOLE or SIMPLE_PINHOLE, images PNG or JPEG.
+ * Reads a scene of any format that skep_job_plan reads: a COLMAP workspace or model with any lens, text or
+ * binary, nerfstudio's transforms.json, OpenMVS, MVSNet, OpenSfM, Middlebury. Photographs are undistorted;
+ * the options `input.*` choose, reduce and mask them. Uses threads of its own, as many as the option
+ * `threads` says.
  *
- * @param folder     Path of the folder, in the bytes of the file system.
- * @param near       Smallest depth of every view in world units; 0 with `far` 0 derives the ranges from the
- *                   sparse points.
- * @param far        Largest depth of every view in world units.
- * @param scene_out  Receives the scene; destroy it with skep_scene_destroy.
- * @retval SKEP_ERR_ARGUMENT  Not 0 < near < far, or a scene that skep_scene_validate refuses.
+ * @param path             Path of the scene, a folder or a file, in the bytes of the file system.
+ * @param options_or_null  Options, of which `input.*`, `threads` and `memory` count; NULL for the defaults.
+ * @param near             Smallest depth of every view in world units; 0 with `far` 0 derives the ranges from
+ *                         the scene.
+ * @param far              Largest depth of every view in world units.
+ * @param scene_out        Receives the scene; destroy it with skep_scene_destroy. skep_scene_get_warning
+ *                         tells what was found out while it was read.
+ * @retval SKEP_ERR_ARGUMENT  Not 0 < near < far, a choice that fits no photograph, or a scene that
+ *                            skep_scene_validate refuses.
  * @retval SKEP_ERR_FILE      A file that is missing or cannot be used; the text names the file, the line
  *                            where there is one, and what was expected.
+ * @retval SKEP_ERR_MEMORY    Photographs that do not fit.
  */
-skep_status skep_scene_read_colmap(const char *folder,
-                                   double near,
-                                   double far,
-                                   struct skep_scene **scene_out);
+skep_status skep_scene_read(const char *path,
+                            const struct skep_options *options_or_null,
+                            double near,
+                            double far,
+                            struct skep_scene **scene_out);
 
 /**
- * Writes a scene as a folder that COLMAP and skep_scene_read_colmap read: images as PNG files under the
+ * Writes a scene as a folder that COLMAP and skep_scene_read read: images as PNG files under the
  * names of their views in images/, and a binary model in sparse/. A name need not end in .png: readers of
  * images look at the content.
  *

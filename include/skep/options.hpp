@@ -35,12 +35,20 @@
 //       The photographs to take: names or patterns with * and ?, separated by commas, or the path of a text
 //       file with one on each line; all if empty.
 //       default:
+//   input.reference
+//       The photographs that get maps, in the form of input.images; all if empty. Of the others only their
+//       source views are taken, which get none.
+//       default:
 //   input.masks
 //       Folder of masks: NAME.png for the photograph NAME; where it is 0 nothing is estimated. None if empty.
 //       default:
 //   input.sources
 //       File with the source views of each view, in the layout of COLMAP's patch-match.cfg; chosen by
 //       triangulation angle if empty.
+//       default:
+//   input.depth_ranges
+//       File with depth ranges of views, lines NAME NEAR FAR; the ranges of other views follow from the
+//       sparse points. None if empty.
 //       default:
 //   input.bounds
 //       Box of the world in which surfaces are reconstructed, x0 y0 z0 x1 y1 z1; everything if empty.
