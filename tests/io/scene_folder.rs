@@ -63,8 +63,11 @@ fn without_points_a_depth_range_is_needed() {
 #[test]
 fn what_is_missing_is_named() {
     let folder = tempdir().unwrap();
-    assert_refused(read_scene(&folder.path().join("none"), None), &["none", "no such folder"]);
-    assert_refused(read_scene(folder.path(), None), &["sparse/", "sparse/0/", "cameras.txt", "cameras.bin"]);
+    assert_refused(read_scene(&folder.path().join("none"), None), &["none", "no such file or folder"]);
+    assert_refused(
+        read_scene(folder.path(), None),
+        &["no scene", "COLMAP model", "sparse/", "transforms.json"],
+    );
     model().write_text(&folder.path().join("sparse")).unwrap();
     assert_refused(read_scene(folder.path(), None), &["images", "no such folder"]);
     write_pictures(folder.path(), &model());
