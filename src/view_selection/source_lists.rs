@@ -190,9 +190,13 @@ fn describe_fallback(name: &str, fallback: &[Pair], options: &Options) -> String
     if fallback.is_empty() {
         return format!("{name} overlaps with no other view: no depth can be estimated for it");
     }
+    let count = match fallback.iter().any(|pair| pair.is_inside(options)) {
+        true => "only one",
+        false => "no",
+    };
     let angles: Vec<String> = fallback.iter().map(|pair| format!("{:.1}", pair.angle)).collect();
     format!(
-        "{name} has no source view with a triangulation angle of {min} to {max} degrees; those with the \
+        "{name} has {count} source view with a triangulation angle of {min} to {max} degrees; those with the \
          nearest angles are used: {} degrees",
         angles.join(" and ")
     )
