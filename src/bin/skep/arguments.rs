@@ -256,8 +256,8 @@ enum Part {
 pub struct View {
     /// Folder of the run
     pub folder: PathBuf,
-    /// Serve the report to browsers on this machine at http://127.0.0.1:PORT/ until Ctrl-C, instead of opening
-    /// it; 0 takes a free port. While the run goes on, the page shows what is done so far
+    /// Serve the report to browsers on this machine at http://127.0.0.1:PORT/ until Ctrl-C, instead of
+    /// opening it; 0 takes a free port. While the run goes on, the page shows what is done so far
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8090")]
     pub serve: Option<u16>,
     /// Make the page again, also if the run wrote one

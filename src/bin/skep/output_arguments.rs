@@ -177,11 +177,18 @@ mod tests {
         let default = ViewFiles::default().to_string();
         assert_eq!(parsed("-report"), Ok((default.clone(), false)));
         assert_eq!(parsed("+report"), Ok((default, true)));
-        assert_eq!(parsed("+graphs, -report").map(|(files, page)| (files.contains("graphs"), page)), Ok((true, false)));
+        assert_eq!(
+            parsed("+graphs, -report").map(|(files, page)| (files.contains("graphs"), page)),
+            Ok((true, false))
+        );
         assert_eq!(parsed("depth"), Ok(("depth".to_owned(), false)));
         assert_eq!(parsed("depth,report"), Ok(("depth".to_owned(), true)));
         assert_eq!(parsed("report"), Ok((String::new(), true)));
         assert_eq!(parsed("+graphs").map(|(_, page)| page), Ok(true));
-        assert!(parsed("depth,-report").is_err() && parsed("+depth,report").is_err() && parsed("reports").is_err());
+        assert!(
+            parsed("depth,-report").is_err()
+                && parsed("+depth,report").is_err()
+                && parsed("reports").is_err()
+        );
     }
 }

@@ -91,7 +91,12 @@ pub fn conclude(
     let output = job.workspace().folder();
     // Reports that are there are of the process that did the work, with its times.
     let is_reported = report_path(output).is_file();
-    let page = match has_page && !output.join(PAGE_NAME).is_file() {
+    let page_path = output.join(PAGE_NAME);
+    if !is_reported {
+        // One of the run before it was complete.
+        remove(&page_path)?;
+    }
+    let page = match has_page && !page_path.is_file() {
         true => {
             let files = match is_reported {
                 true => RunFiles::find(output)?,
@@ -103,7 +108,14 @@ pub fn conclude(
                 dump: dump.map(Path::to_owned),
                 goes_on: &|| interrupt.control_flow().is_continue(),
             };
-            Some((report::make(&files, &options)?, files))
+            let page = report::make(&files, &options).inspect_err(|error| {
+                if *error == Error::Cancelled {
+                    streams::notice(
+                        "interrupted: maps and cloud are done; the same command writes the reports",
+                    );
+                }
+            })?;
+            Some((page, files))
         }
         false => None,
     };

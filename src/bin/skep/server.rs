@@ -1,7 +1,7 @@
 //! A server of one page for browsers on this machine.
 //!
-//! It listens on the loopback address alone. Web sites that a user visits could still send requests there, under
-//! a name of their own that they let point to it: requests for other hosts are refused.
+//! It listens on the loopback address alone. Web sites that a user visits could still send requests there,
+//! under a name of their own that they let point to it: requests for other hosts are refused.
 
 use crate::interrupt::Interrupt;
 use crate::streams;

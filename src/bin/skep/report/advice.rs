@@ -10,7 +10,7 @@ use skep::PixelStatus;
 /// Fraction of a view's pixels below which few are validated.
 const FEW_VALIDATED: f64 = 0.2;
 /// Fraction of all pixels above which the reason why they are not validated is named.
-const LARGE_SHARE: f64 = 0.15;
+const LARGE_SHARE: f64 = 0.3;
 /// The same for pixels at an end of the depth range: they are a sign of a range that is too narrow.
 const LARGE_OUT_OF_RANGE: f64 = 0.03;
 /// Angles in degrees below and above which depths are uncertain and surfaces look different.
@@ -55,7 +55,10 @@ fn of_warning(text: &str) -> Advice {
         ("made again", "Nothing: the files are whole again. If it happens often, check the disk."),
         ("begins anew", "Nothing, if you changed the scene or the options on purpose."),
         ("the cloud is", "The section on figures per view shows where pixels are lost."),
-        ("overlaps with no other view", "Take photographs between this view and the others, or leave it out."),
+        (
+            "overlaps with no other view",
+            "Take photographs between this view and the others, or leave it out.",
+        ),
         ("sources", "Take photographs from viewpoints 5 to 20 degrees apart, so that neighbors overlap."),
         ("angle", "Take photographs from viewpoints 5 to 20 degrees apart, so that neighbors overlap."),
         ("depth range", "Set --depth-range MIN MAX if surfaces are missing beyond some distance."),
@@ -148,11 +151,11 @@ fn of_geometry(files: &RunFiles, geometry: &Geometry) -> Vec<Advice> {
         listed(
             narrow.collect(),
             format!("less than {SMALL_ANGLE} degrees between the rays of neighbors: depths are uncertain"),
-            "Move sideways between photographs, 5 to 20 degrees around the surface; do not only turn the camera.",
+            "Move sideways between photographs, 5 to 20 degrees around the surface; turning does not help.",
         ),
         listed(
             wide.collect(),
-            format!("more than {LARGE_ANGLE} degrees between the rays of neighbors: surfaces look too different"),
+            format!("more than {LARGE_ANGLE} degrees between the rays of neighbors: surfaces look different"),
             "Take photographs between these viewpoints.",
         ),
     ]
@@ -175,7 +178,12 @@ fn listed(views: Vec<usize>, what: String, remedy: &str) -> Option<Advice> {
     let count = views.len();
     let views: Vec<u32> = views.into_iter().take(MOST_NAMES).map(|view| view as u32).collect();
     let subject = if count == 1 { "1 view".to_owned() } else { format!("{count} views") };
-    (count > 0).then(|| Advice { what: format!("{subject}: {what}"), remedy: remedy.to_owned(), views, count })
+    (count > 0).then(|| Advice {
+        what: format!("{subject}: {what}"),
+        remedy: remedy.to_owned(),
+        views,
+        count,
+    })
 }
 
 #[cfg(test)]
@@ -186,12 +194,12 @@ mod tests {
     #[test]
     fn reasons_of_many_pixels_come_with_a_remedy() {
         let totals = json!({"status_counts": {
-            "validated": 500, "masked": 1000, "no_texture": 300, "no_sources": 10, "inconsistent": 140,
+            "validated": 500, "masked": 1000, "no_texture": 310, "no_sources": 0, "inconsistent": 140,
             "out_of_range": 50,
         }});
         let found = of_statuses(&totals);
         assert_eq!(found.len(), 2, "{found:?}");
-        assert_eq!(found[0].what, "30 % of the pixels are no texture: too uniform to be matched");
+        assert_eq!(found[0].what, "31 % of the pixels are no texture: too uniform to be matched");
         assert_eq!(found[0].remedy, "More texture or more light.");
         assert!(found[1].what.starts_with("5 % of the pixels are out of range"), "{found:?}");
         assert!(of_statuses(&Value::Null).is_empty());

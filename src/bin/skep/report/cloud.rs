@@ -10,8 +10,8 @@ use std::io;
 use std::path::Path;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Largest relative difference between a point's depth in a view and the depth sample there whose confidence it
-/// takes.
+/// Largest relative difference between a point's depth in a view and the depth sample there whose confidence
+/// it takes.
 const SAME_DEPTH: f64 = 0.03;
 /// Bytes of a point: three coordinates of two bytes, three of color, two of the normal, and one each for the
 /// number of views and the confidence.
@@ -77,7 +77,8 @@ impl Cloud {
             return;
         }
         for &point in points {
-            let Some((pixel, depth)) = camera.project(DVec3::from(self.points[point as usize].position)) else {
+            let Some((pixel, depth)) = camera.project(DVec3::from(self.points[point as usize].position))
+            else {
                 continue;
             };
             let Some(pixel) = camera.nearest_pixel(pixel) else { continue };
@@ -94,7 +95,8 @@ impl Cloud {
     /// Adds at most `most` validated samples of a view as points.
     pub fn add_samples(&mut self, view: u32, camera: &Camera, thumbnails: &Thumbnails, most: usize) {
         let Thumbnails { grid, samples, .. } = thumbnails;
-        let valid: Vec<usize> = (0..samples.depth.len()).filter(|&index| samples.depth[index] > 0.0).collect();
+        let valid: Vec<usize> =
+            (0..samples.depth.len()).filter(|&index| samples.depth[index] > 0.0).collect();
         let to_world = camera.rotation.transpose();
         for place in cloud_files::places(valid.len() as u64, most) {
             let index = valid[place as usize];
@@ -129,8 +131,8 @@ impl Cloud {
             places.iter().map(|&place| std::mem::take(&mut self.confidences[place as usize])).collect();
     }
 
-    /// What the page needs to know of the points, and the points: all coordinates, all colors, all normals, all
-    /// numbers of views, all confidences.
+    /// What the page needs to know of the points, and the points: all coordinates, all colors, all normals,
+    /// all numbers of views, all confidences.
     pub fn encode(&self, up: DVec3) -> (Value, Vec<u8>) {
         let positions = || self.points.iter().map(|point| DVec3::from(point.position));
         let min = positions().fold(DVec3::INFINITY, DVec3::min);

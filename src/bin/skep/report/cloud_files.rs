@@ -116,7 +116,8 @@ fn read_header(file: &mut impl BufRead) -> io::Result<(u64, bool)> {
 
 fn parse_point(record: &[u8], is_double: bool) -> SampledPoint {
     let float = |offset: usize| f32::from_le_bytes(record[offset..offset + 4].try_into().unwrap_or_default());
-    let double = |offset: usize| f64::from_le_bytes(record[offset..offset + 8].try_into().unwrap_or_default());
+    let double =
+        |offset: usize| f64::from_le_bytes(record[offset..offset + 8].try_into().unwrap_or_default());
     let position = std::array::from_fn(|axis| match is_double {
         true => double(8 * axis),
         false => float(4 * axis).into(),

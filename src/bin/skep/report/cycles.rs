@@ -75,6 +75,9 @@ mod tests {
     fn folders_of_cycles_are_read_in_words() {
         assert_eq!(label("03-size2-cycle4").as_deref(), Some("1/2 size, cycle 4"));
         assert_eq!(label("10-size1-cycle1").as_deref(), Some("full size, cycle 1"));
-        assert_eq!((label("preview"), label("03-size2-cycle4-x"), label("a-size2-cycle4")), (None, None, None));
+        assert_eq!(
+            (label("preview"), label("03-size2-cycle4-x"), label("a-size2-cycle4")),
+            (None, None, None)
+        );
     }
 }

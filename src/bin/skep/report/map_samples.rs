@@ -42,7 +42,8 @@ impl SampleGrid {
 
     /// The sample of the cell that a pixel lies in.
     pub fn index(self, camera: &Camera, (x, y): (u32, u32)) -> usize {
-        let cell = |pixel: u32, cells: u32, pixels: u32| u64::from(pixel) * u64::from(cells) / u64::from(pixels);
+        let cell =
+            |pixel: u32, cells: u32, pixels: u32| u64::from(pixel) * u64::from(cells) / u64::from(pixels);
         let row = cell(y, self.rows, camera.height);
         (row * u64::from(self.columns) + cell(x, self.columns, camera.width)) as usize
     }

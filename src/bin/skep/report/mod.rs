@@ -2,8 +2,8 @@
 //! to judge it.
 //!
 //! The page is one file without references to others: template, styles and the bundled viewer of `viewer/`,
-//! figures as JSON, pictures and points in base64. It is made from the files in the folder of the run, view by
-//! view, so that it can be made later as well, or while the run goes on; what is not there is said to be
+//! figures as JSON, pictures and points in base64. It is made from the files in the folder of the run, view
+//! by view, so that it can be made later as well, or while the run goes on; what is not there is said to be
 //! missing.
 
 mod advice;

@@ -23,7 +23,7 @@ const PAGE_BYTES: usize = 25_000_000;
 /// Points of the cloud at most.
 const MOST_POINTS: usize = 300_000;
 /// Points of the cloud that are kept for, whatever the pictures take.
-const LEAST_POINTS: usize = 200_000;
+const LEAST_POINTS: usize = 150_000;
 /// Width of the pictures of views in pixels, at most and at least.
 const WIDTHS: (u32, u32) = (448, 48);
 /// Bytes of the pictures of a view for each of their pixels, about.
@@ -33,7 +33,9 @@ const PROBED_VIEWS: usize = 6;
 /// Bytes of the pictures of cycles at most.
 const CYCLES_BYTES: usize = 2_500_000;
 /// Bytes of JSON for each view, at most in most cases: names, figures, cycles.
-const VIEW_JSON_BYTES: usize = 4000;
+const VIEW_JSON_BYTES: usize = 2600;
+/// Bytes for figures that are not known when the points are counted.
+const SPARE_BYTES: usize = 20_000;
 /// Bytes of memory for each pixel of a photograph while it is reduced.
 const BYTES_PER_PHOTOGRAPH_PIXEL: u64 = 16;
 
@@ -92,46 +94,77 @@ fn make_on_pool(files: &RunFiles, options: &PageOptions) -> Result<Page> {
             width = (f64::from(width) * (0.95 * budget as f64 / bytes as f64).sqrt()) as u32;
         }
         made = views_pictures(files, options, (width, &cloud))?;
-        bytes = made.iter().flat_map(|view| view.layers.iter().flatten()).map(|bytes| base64_length(bytes.len())).sum();
+        bytes = pictures_bytes(&made);
     }
+    let left_out = leave_out(&mut made, budget, bytes);
     if !cloud.is_fused() {
         let finished = made.iter().filter(|view| !view.samples.depth.is_empty()).count().max(1);
         for (view, thumbnails) in made.iter().enumerate() {
-            cloud.add_samples(view as u32, &files.model.images[view].camera, thumbnails, MOST_POINTS / finished);
+            cloud.add_samples(
+                view as u32,
+                &files.model.images[view].camera,
+                thumbnails,
+                MOST_POINTS / finished,
+            );
         }
     }
-    let rest = PAGE_BYTES.saturating_sub(fixed + bytes);
-    cloud.thin((rest / 4 * 3 / POINT_BYTES).min(MOST_POINTS));
-
     let middles: Vec<Option<f64>> =
         made.iter().map(|view| view.depth_range.map(|(low, high)| (low * high).sqrt())).collect();
     let geometry = Geometry::new(files, &middles);
-    let (cloud_facts, points) = cloud.encode(geometry.up);
-    blobs.push(("cloud".to_owned(), points));
-    let facts: Vec<Value> =
-        made.iter().enumerate().map(|(view, thumbnails)| view_facts(files, &geometry, view, thumbnails)).collect();
+    let facts: Vec<Value> = made
+        .iter()
+        .enumerate()
+        .map(|(view, thumbnails)| view_facts(files, &geometry, view, thumbnails))
+        .collect();
     for (view, thumbnails) in made.into_iter().enumerate() {
         let pictures = LAYERS.into_iter().zip(thumbnails.layers);
         blobs.extend(pictures.filter_map(|(layer, bytes)| Some((format!("view-{view}-{layer}"), bytes?))));
     }
-    let data = json!({
+    let mut data = json!({
         "title": files.title(),
         "version": env!("CARGO_PKG_VERSION"),
         "complete": files.is_complete,
         "finished": (0..views).filter(|&view| files.is_finished(view)).count(),
         "views": facts,
-        "cloud": cloud_facts,
+        "left_out": left_out,
         "geometry": geometry.facts(),
         "advice": advice(files, &geometry),
         "dump": dump,
     });
+    // The cloud takes what is left; the times and the facts of the cloud are not in the figures yet.
+    let figures = script_text(&data).len() + script_text(&compact(&files.report)).len() + SPARE_BYTES;
+    let taken = TEMPLATE.len() + STYLES.len() + VIEWER.len() + encoded(&blobs) + figures;
+    cloud.thin((PAGE_BYTES.saturating_sub(taken) / 4 * 3 / POINT_BYTES).min(MOST_POINTS));
+    let (cloud_facts, points) = cloud.encode(geometry.up);
+    blobs.push(("cloud".to_owned(), points));
+    data["cloud"] = cloud_facts;
     Ok(Page { data, blobs })
+}
+
+/// Leaves out the pictures of some views, evenly, where even the smallest do not fit; returns their number.
+fn leave_out(made: &mut [Thumbnails], budget: usize, bytes: usize) -> usize {
+    let share = (budget as f64 / bytes.max(1) as f64).min(1.0);
+    let kept = |count: usize| (count as f64 * share) as usize;
+    let mut left_out = 0;
+    for (view, thumbnails) in made.iter_mut().enumerate() {
+        if kept(view + 1) == kept(view) {
+            thumbnails.layers = Default::default();
+            left_out += 1;
+        }
+    }
+    left_out
+}
+
+fn pictures_bytes(made: &[Thumbnails]) -> usize {
+    let pictures = made.iter().flat_map(|view| view.layers.iter().flatten());
+    pictures.map(|bytes| base64_length(bytes.len())).sum()
 }
 
 /// The width of the pictures with which those of all views take `budget` bytes in base64.
 fn chosen_width(files: &RunFiles, budget: usize) -> u32 {
     let images = &files.model.images;
-    let aspect: f64 = images.iter().map(|image| f64::from(image.camera.height) / f64::from(image.camera.width)).sum();
+    let aspect: f64 =
+        images.iter().map(|image| f64::from(image.camera.height) / f64::from(image.camera.width)).sum();
     let width_for = |bytes_per_pixel: f64| {
         let pixels = budget as f64 * 0.75 / bytes_per_pixel;
         (pixels / aspect.max(f64::MIN_POSITIVE)).sqrt().clamp(WIDTHS.1.into(), WIDTHS.0.into()) as u32
@@ -286,7 +319,11 @@ fn compact(report: &Value) -> Value {
 /// JSON that can stand in a script element: nothing in it ends the element or begins a comment.
 fn script_text(data: &Value) -> String {
     let text = data.to_string();
-    text.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026").replace('\u{2028}', "\\u2028").replace('\u{2029}', "\\u2029")
+    text.replace('<', "\\u003c")
+        .replace('>', "\\u003e")
+        .replace('&', "\\u0026")
+        .replace('\u{2028}', "\\u2028")
+        .replace('\u{2029}', "\\u2029")
 }
 
 /// Text in HTML.

@@ -56,11 +56,6 @@ impl RunFiles {
         Ok(RunFiles { workspace, scene, model, report, is_complete: Some(true) })
     }
 
-    /// The photograph of a view.
-    pub fn photograph(&self, view: usize) -> PathBuf {
-        self.scene.images.join(&self.model.images[view].name)
-    }
-
     /// Whether the validated depths of a view are there.
     pub fn is_finished(&self, view: usize) -> bool {
         self.workspace.depth_map(&self.model.images[view].name, MapKind::Validated).is_file()

@@ -1,7 +1,7 @@
 //! The pictures of a view in the page: the photograph, and maps sampled on a coarse grid.
 //!
-//! Maps are stored as gray or color PNG pictures of numbers that the page reads back: it colors them, and shows
-//! the value under the cursor. [`LAYERS`] says how each is quantised; the page repeats that.
+//! Maps are stored as gray or color PNG pictures of numbers that the page reads back: it colors them, and
+//! shows the value under the cursor. The constants say how each is quantised; the page repeats that.
 
 use super::map_samples::{self, SampleGrid};
 use super::run_files::RunFiles;
@@ -75,7 +75,9 @@ pub fn make(files: &RunFiles, view: usize, width: u32) -> Thumbnails {
     let normal = map(&files.workspace.normal_map(name, MapKind::Validated), 3);
     let samples = Samples { depth, normal, confidence, sources: sources.unwrap_or_default(), color };
     let depth_range = depth_range(&samples.depth);
-    let gray = |numbers: Vec<u8>| (!numbers.is_empty()).then(|| png(&numbers, grid, ExtendedColorType::L8)).flatten();
+    let gray = |numbers: Vec<u8>| {
+        (!numbers.is_empty()).then(|| png(&numbers, grid, ExtendedColorType::L8)).flatten()
+    };
     let layers = [
         photograph(&samples.color, grid),
         depth_range.and_then(|range| gray(depth_numbers(&samples.depth, range))),
@@ -147,7 +149,7 @@ fn photograph(colors: &[[u8; 3]], grid: SampleGrid) -> Option<Vec<u8>> {
 
 fn png(numbers: &[u8], grid: SampleGrid, kind: ExtendedColorType) -> Option<Vec<u8>> {
     let mut bytes = Vec::new();
-    PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive)
+    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive)
         .write_image(numbers, grid.columns, grid.rows, kind)
         .ok()?;
     Some(bytes)
@@ -229,7 +231,8 @@ mod tests {
         let read = |number: u8| (f32::from(number - NORMAL_STEP / 2) / 252.0) * 2.0 - 1.0;
         let found = [read(numbers[3]), -read(numbers[4]), -read(numbers[5])];
         assert!(found.iter().zip([0.6, 0.0, -0.8]).all(|(found, truth)| (found - truth).abs() < 0.017));
-        let samples = Samples { depth: vec![0.0, 1.0, 1.0], confidence: vec![0.0, 0.0, 1.0], ..Samples::default() };
+        let samples =
+            Samples { depth: vec![0.0, 1.0, 1.0], confidence: vec![0.0, 0.0, 1.0], ..Samples::default() };
         assert_eq!(confidence_numbers(&samples), [0, 1, 51]);
     }
 

@@ -16,7 +16,8 @@ pub fn report(state: &RunState, model: &ColmapModel) -> Value {
     }
     let mut cycles: Vec<CycleRecord> = Vec::new();
     for cycle in state.views.iter().flat_map(|view| &view.cycles) {
-        let same = |total: &&mut CycleRecord| (total.downscale, total.cycle) == (cycle.downscale, cycle.cycle);
+        let same =
+            |total: &&mut CycleRecord| (total.downscale, total.cycle) == (cycle.downscale, cycle.cycle);
         match cycles.iter_mut().find(same) {
             Some(total) => {
                 total.pixels += cycle.pixels;

@@ -29,13 +29,16 @@ function cameraMap({ links, has_tracks: hasTracks, parts }) {
   const skip = Math.max(1, Math.floor(total / MOST_DOTS));
   const dots = [];
   for (let point = 0; point < total; point += skip) dots.push(flat(position(point)));
-  // Points far off do not shrink the map.
+  // Points far off do not shrink the map: it reaches three times the extent of the cameras beyond them.
+  const extent = Math.max(...[0, 1].map((axis) => Math.max(...cameras.map((place) => place[axis])) - Math.min(...cameras.map((place) => place[axis]))));
   const [width, height, edge] = [560, 400, 24];
   const bounds = [0, 1].map((axis) => {
     const own = cameras.map((place) => place[axis]);
     const others = dots.map((place) => place[axis]).sort((a, b) => a - b);
     const at = (share) => others[Math.round((others.length - 1) * share)];
-    return [Math.min(...own, at(0.05) ?? Infinity), Math.max(...own, at(0.95) ?? -Infinity)];
+    const [low, high] = [Math.min(...own), Math.max(...own)];
+    const reach = extent > 0 ? 3 * extent : Infinity;
+    return [Math.min(low, Math.max(at(0.05) ?? low, low - reach)), Math.max(high, Math.min(at(0.95) ?? high, high + reach))];
   });
   const spans = bounds.map(([low, high]) => high - low || 1);
   const factor = Math.min((width - 2 * edge) / spans[0], (height - 2 * edge) / spans[1]);
@@ -86,7 +89,7 @@ function histogram({ bin, bins, has_tracks: hasTracks }) {
   if (all === 0) return element("div", {}, element("h3", {}, "Triangulation angles"), element("p", { class: "notice" }, "No angles are known: neither common points nor depths."));
   const last = Math.max(10, bins.findLastIndex((value) => value > 0) + 1);
   const used = bins.slice(0, last);
-  const [width, height, left, right, top, bottom] = [560, 260, 40, 8, 10, 42];
+  const [width, height, left, right, top, bottom] = [560, 270, 40, 16, 24, 42];
   const most = Math.max(...used);
   const x = (angle) => left + angle / (bin * last) * (width - left - right);
   const y = (value) => top + (1 - value / most) * (height - top - bottom);
@@ -94,8 +97,8 @@ function histogram({ bin, bins, has_tracks: hasTracks }) {
   const median = bin * (used.findIndex((value) => (below += value) >= all / 2) + 0.5);
   const label = `Triangulation angles of ${count(all, "pair")} of view and source, the median about ${median} degrees`;
   const chart = shape("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": label });
-  chart.append(shape("rect", { x: x(5), y: top, width: x(20) - x(5), height: height - top - bottom, fill: "var(--accent-soft)" }),
-    shape("text", { x: x(5) + 6, y: top + 14 }, "5\u00b0 to 20\u00b0: good"));
+  chart.append(shape("rect", { x: x(5), y: top, width: x(20) - x(5), height: height - top - bottom, fill: "var(--sunken)" }),
+    shape("text", { x: (x(5) + x(20)) / 2, y: top - 8, "text-anchor": "middle" }, "5\u00b0 to 20\u00b0: good"));
   used.forEach((value, index) => {
     if (!value) return;
     chart.append(shape("rect", { x: x(bin * index) + 1, y: y(value), width: x(bin) - x(0) - 2, height: y(0) - y(value), fill: "var(--bar)", rx: 2 },

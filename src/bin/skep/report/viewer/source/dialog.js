@@ -46,6 +46,7 @@ function show(view) {
   const { name, size, grid, angle, points, sources } = views[view];
   const report = viewReport(view);
   title.textContent = name;
+  canvas.style.width = `min(100%, ${(62 * grid[0] / grid[1]).toFixed(1)}vh)`;
   cross = [Math.floor(grid[0] / 2), Math.floor(grid[1] / 2)];
   canvas.setAttribute("aria-label", `${name}, layer ${layer()}; arrow keys move the place whose value is read`);
   paint(canvas, view, layer()).then(() => read([0.5, 0.5], false));

@@ -23,8 +23,9 @@ export function layerSlider(id) {
     type: "range", id, min: 0, max: LAYERS.length - 1, step: 1, "aria-label": "Layer shown in every view",
     oninput: () => setLayer(LAYERS[input.value]),
   });
-  const stops = LAYERS.map((name) => element("button", {
+  const stops = LAYERS.map((name, index) => element("button", {
     type: "button", tabindex: "-1", "data-layer": name, onclick: () => setLayer(name),
+    style: { left: `${100 * index / (LAYERS.length - 1)}%` },
   }, TITLES[name]));
   const show = () => {
     input.value = LAYERS.indexOf(current);
@@ -80,7 +81,7 @@ export function gallery() {
   const list = element("ul", { class: views.length > 40 ? "gallery many" : "gallery" }, ...tiles.map(({ item }) => item));
   section("views", "Views", null,
     element("div", { class: "layers" }, layerSlider("layer")),
-    element("div", { class: "under" }, legendPlace, element("div", {}, readout, note)), element("p"), list);
+    element("div", { class: "under" }, legendPlace, element("div", {}, readout, note)), list);
   show();
 }
 

@@ -4,7 +4,7 @@
 // of the view. Normal: three components in 64 steps. Sources: a number. Confidence: 0 is none, 1 to 51 are steps
 // of 0.02. Status: its number.
 
-import { hasBlob, picture, viewReport, views } from "./data.js";
+import { data, hasBlob, picture, viewReport, views } from "./data.js";
 import { number } from "./dom.js";
 import { STATUSES, keyLegend, ramp, rampLegend, ticks } from "./colors.js";
 
@@ -14,7 +14,7 @@ const NORMAL_STEPS = 63;
 
 export const LAYERS = ["photograph", "depth", "normal", "sources", "confidence", "status"];
 export const TITLES = {
-  photograph: "Photograph", depth: "Depth", normal: "Normal", sources: "Sources", confidence: "Confidence", status: "Status",
+  photograph: "Photo", depth: "Depth", normal: "Normal", sources: "Sources", confidence: "Confidence", status: "Status",
 };
 const MISSING = {
   photograph: "the photograph is not in the folder of the run",
@@ -106,7 +106,14 @@ export async function valueAt(view, layer, [across, down]) {
   return { text: `${name}, pixel ${x}, ${y}: ${VALUES[layer](view, numbers)}`, column, row };
 }
 
-export const missing = (view, layer) => views[view].finished || layer === "photograph" ? MISSING[layer] : "not finished yet";
+// Why a layer of a view is missing.
+export function missing(view, layer) {
+  if (data.left_out > 0 && !LAYERS.some((name) => hasLayer(view, name))) return "left out, as the page would be larger than 25 MB";
+  if (layer === "photograph") return MISSING.photograph;
+  if (!views[view].finished) return "not finished yet";
+  if (layer === "sources" && data.complete === false) return "known when the run is complete";
+  return MISSING[layer];
+}
 
 // The legend of a layer, and what its values are exact to.
 export function legend(layer) {

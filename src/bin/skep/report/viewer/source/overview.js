@@ -7,7 +7,7 @@ import { openView } from "./dialog.js";
 export function overview() {
   const totals = report.totals ?? {};
   const settings = report.preset ? `preset ${report.preset}` : report.options ? "own options" : null;
-  const machine = report.threads ? `${count(report.threads, "thread")}, ${report.simd}` : null;
+  const machine = report.threads ? `${count(report.threads, "thread")}, SIMD level ${report.simd}` : null;
   const facts = [`skep ${report.version ?? data.version}`, settings, machine];
   document.getElementById("subtitle").textContent = facts.filter(Boolean).join(" \u00b7 ");
   if (data.complete === false) badge();
