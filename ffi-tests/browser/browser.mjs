@@ -16,10 +16,11 @@ const HARMLESS = /GPU stall due to ReadPixels/;
 export async function withPage(scratch, url, options, use) {
   const profile = mkdtempSync(join(scratch, "profile-"));
   const context = await chromium.launchPersistentContext(profile, {
-    executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", headless: true, args: [...ARGUMENTS, ...(options.args ?? [])],
-    viewport: { width: 1280, height: 900 }, ...options, 
+    executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", headless: true, viewport: { width: 1280, height: 900 }, ...options,
+    args: ARGUMENTS,
   });
   try {
+    if (options.script) await context.addInitScript(options.script);
     const page = await context.newPage();
     const problems = [];
     page.on("console", (message) => {

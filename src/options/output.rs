@@ -109,7 +109,8 @@ pub struct ViewFiles {
 
 impl Default for ViewFiles {
     fn default() -> ViewFiles {
-        ViewFiles { graphs: false, ..ViewFiles::ALL }
+        let graphs = false;
+        ViewFiles { depth: true, normals: true, confidence: true, status: true, graphs, previews: true }
     }
 }
 

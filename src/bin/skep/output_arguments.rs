@@ -71,9 +71,9 @@ impl CloudArguments {
 /// The files of a run.
 #[derive(Args)]
 pub struct OutputArguments {
-    /// Files to write: for each view some of depth, normals, confidence, status, graphs, previews, and report,
-    /// the page report.html; with + or - before each they are added to the default or left out [default:
-    /// depth,normals,confidence,status,previews,report]
+    /// Files to write: for each view some of depth, normals, confidence, status, graphs, previews, and
+    /// report, the page report.html; with + or - before each they are added to the default or left out
+    /// [default: depth,normals,confidence,status,previews,report]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     write: Option<WrittenFiles>,
     #[command(flatten)]

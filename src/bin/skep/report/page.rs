@@ -42,6 +42,7 @@ const BYTES_PER_PHOTOGRAPH_PIXEL: u64 = 16;
 const TEMPLATE: &str = include_str!("viewer/page.html");
 const STYLES: &str = include_str!("viewer/page.css");
 const VIEWER: &str = include_str!("viewer/dist/viewer.js");
+const LICENSE: &str = include_str!("viewer/dist/LICENSE-three");
 const VIEWER_HASH: &str = include_str!("viewer/dist/viewer.js.sha256");
 
 /// How a page is made.
@@ -262,6 +263,7 @@ impl Page {
                 "TITLE" => out.write_all(title.as_bytes())?,
                 "HASH" => out.write_all(VIEWER_HASH.trim().as_bytes())?,
                 "STYLES" => out.write_all(STYLES.as_bytes())?,
+                "LICENSE" => out.write_all(escaped(LICENSE).as_bytes())?,
                 "DATA" => out.write_all(script_text(&data).as_bytes())?,
                 "VIEWER" => out.write_all(VIEWER.as_bytes())?,
                 "BLOBS" => {
@@ -358,6 +360,6 @@ mod tests {
     fn a_template_has_texts_and_named_parts() {
         assert_eq!(parts("a<!--{X}-->b<!--{Y}-->"), [("X", "a"), ("Y", "b"), ("", "")]);
         let names: Vec<&str> = parts(TEMPLATE).into_iter().map(|(name, _)| name).collect();
-        assert_eq!(names, ["HASH", "TITLE", "STYLES", "TITLE", "DATA", "BLOBS", "VIEWER", ""]);
+        assert_eq!(names, ["HASH", "TITLE", "STYLES", "TITLE", "LICENSE", "DATA", "BLOBS", "VIEWER", ""]);
     }
 }

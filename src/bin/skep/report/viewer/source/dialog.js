@@ -31,7 +31,7 @@ function build() {
   dialog.replaceChildren(
     element("div", { class: "row" }, title, element("div", { class: "row" },
       button("\u2190", "Previous view", () => step(-1)), button("\u2192", "Next view", () => step(1)),
-      button("Look through", "Look at the cloud through this camera", () => { dialog.close(); lookThrough(shown); }),
+      button("Look through", "Look through this camera at the cloud", () => { dialog.close(); lookThrough(shown); }),
       button("Close", "Close", () => dialog.close()))),
     layerSlider("view-layer"), canvas, value, bar, facts, legendPlace);
   parts = { title, canvas, value, facts, bar, legendPlace };

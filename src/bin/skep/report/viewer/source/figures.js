@@ -52,5 +52,5 @@ export function figures() {
   const table = element("table", {}, element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "View"),
     element("th", { scope: "col" }, "Status of the pixels"), ...heads)), body);
   section("figures", "Figures per view", null, keyLegend("Status", "share of the pixels", STATUSES.map((status) => ({ ...status, label: `${status.label}: ${status.meaning}` }))),
-    element("div", { class: "tall scroll", tabindex: "0", role: "region", "aria-label": "Figures per view" }, table));
+    element("div", { class: "tall scroll", tabindex: "0", role: "region", "aria-label": "Table of the figures" }, table));
 }

@@ -6,6 +6,9 @@ import { statusBar } from "./colors.js";
 import { LAYERS, TITLES, colored, hasLayer, legend, missing, valueAt } from "./layers.js";
 import { openView } from "./dialog.js";
 
+// Letters of a name in a caption.
+const MOST_LETTERS = 20;
+
 // The layer that is shown, and who repaints when it changes.
 let current = LAYERS[0];
 const listeners = new Set();
@@ -92,7 +95,7 @@ function tile(view, index, readout) {
   const { status_counts: counts } = viewReport(index);
   const button = element("button", { class: "view", type: "button", onclick: () => openView(index) },
     canvas,
-    element("span", { class: "caption" }, element("span", { title: view.name }, view.name),
+    element("span", { class: "caption" }, element("span", { title: view.name }, short(view.name)),
       element("span", {}, view.finished && Number.isFinite(share) ? percent(share) : view.finished ? "" : "not finished")));
   if (counts) {
     const bar = statusBar(counts);
@@ -106,6 +109,11 @@ function tile(view, index, readout) {
     if (turn === latest) readout.textContent = value.text;
   });
   return { item: element("li", {}, button), canvas };
+}
+
+// A name whose end can be read: that is what differs.
+function short(name) {
+  return name.length > MOST_LETTERS ? `\u2026${name.slice(1 - MOST_LETTERS)}` : name;
 }
 
 // The place of an event in a canvas, from 0 to 1.

@@ -10,7 +10,7 @@ export function options() {
   const table = element("table", {}, element("thead", {}, element("tr", {},
     element("th", { scope: "col" }, "Option"), element("th", { scope: "col" }, "Value"))),
     element("tbody", {}, ...entries.map(row)));
-  section("options", "Options", "`skep info NAME` explains each.",
+  section("options", "Options", "What skep info NAME explains, with the values of this run.",
     element("details", {}, element("summary", {}, `${entries.length} options of this run`),
-      element("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Options" }, table)));
+      element("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Table of the options" }, table)));
 }

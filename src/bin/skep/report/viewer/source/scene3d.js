@@ -87,7 +87,7 @@ export class Scene3d {
     this.points.frustumCulled = false;
     this.scene.add(this.points);
     // About the distance of neighbors on a surface.
-    this.spacing = 3.2 * this.radius / Math.sqrt(Math.max(points.total, 1));
+    this.spacing = 3.7 * this.radius / Math.sqrt(Math.max(points.total, 1));
     this.factor = 1;
   }
 
