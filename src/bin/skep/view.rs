@@ -86,5 +86,5 @@ fn open(path: &Path) -> bool {
         command.arg(&path).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
         command.status().is_ok_and(|status| status.success())
     };
-    OPENERS.iter().any(|program| run(program))
+    OPENERS.iter().any(run)
 }
