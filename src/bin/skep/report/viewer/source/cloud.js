@@ -9,7 +9,7 @@ import { Scene3d } from "./scene3d.js";
 import { length } from "./vectors.js";
 
 const MODES = { photograph: "Photograph", normal: "Normal", height: "Height", views: "Views", confidence: "Confidence" };
-const KEYS = "Drag to turn, with the right button or two fingers to move, wheel (after a click) or pinch to zoom. Keys: arrows turn, Shift and arrows move, + and \u2212 zoom, Home starts again.";
+const KEYS = "Drag to turn, with the right button or two fingers to move, wheel (after a click) or pinch to zoom. Keys: arrows turn, Shift and arrows move, + and \u2212 zoom, Home resets.";
 
 let scene = null;
 let stage = null;
@@ -62,7 +62,7 @@ function controls(legend) {
   };
   turn.addEventListener("click", () => setTurn(!scene.controls.autoRotate));
   scene.stop = () => scene.controls.autoRotate && setTurn(false);
-  const reset = element("button", { type: "button", class: "button", onclick: () => { scene.reset(); scene.choose(null); } }, "Start again");
+  const reset = element("button", { type: "button", class: "button", onclick: () => { scene.reset(); scene.choose(null); } }, "Reset");
   const full = element("button", { type: "button", class: "button", onclick: () => stage.requestFullscreen() }, "Full screen");
   setMode("photograph");
   setTurn(!matchMedia("(prefers-reduced-motion: reduce)").matches);
