@@ -109,8 +109,10 @@ fn a_run_that_is_not_complete_shows_what_is_done() {
     reconstruct(&scene, output.path(), &[]);
     assert_eq!(page(output.path()).1["complete"], true);
 
-    let (status, printed) = failure(&["view", "no such folder"]);
-    assert_eq!(status, Some(2), "{printed}");
+    for folder in ["no such folder", path(&scene)] {
+        let (status, printed) = failure(&["view", folder]);
+        assert!(status == Some(2) && printed.contains("no run here"), "{printed}");
+    }
 }
 
 /// A server that ends with the test.

@@ -407,8 +407,8 @@ Results, in COLMAP's layouts:
   stereo/depth_maps/NAME.geometric.bin      the validated pixels only
   stereo/normal_maps               likewise; --write +graphs adds stereo/consistency_graphs, the view set
                                    of each pixel: docs/formats.md
-  stereo/status_maps               the status of each pixel: validated, or the reason why it is not
   stereo/confidence_maps           likewise, as depth maps: the probability of each depth to be within 1 %
+  stereo/status_maps/NAME.png      the status of each pixel: validated, or the reason why it is not
   images, sparse                   copy of the scene, for COLMAP: the folder is a workspace
                                    of `colmap stereo_fusion --workspace_path DIR ...`
   report.html                      the page to look at and judge the result, for any browser, offline;

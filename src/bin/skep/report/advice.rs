@@ -83,7 +83,7 @@ fn of_statuses(totals: &Value) -> Vec<Advice> {
         let help = reconstruct::help(status);
         let (meaning, remedy) = help.split_once(": ").unwrap_or((help, ""));
         Advice {
-            what: format!("{share:.0} % of the pixels are {}: {meaning}", status.name().replace('_', " ")),
+            what: format!("{share:.0} % of the pixels have no validated depth: {meaning}"),
             remedy: capitalized(remedy),
             views: Vec::new(),
             count: 0,
@@ -199,9 +199,9 @@ mod tests {
         }});
         let found = of_statuses(&totals);
         assert_eq!(found.len(), 2, "{found:?}");
-        assert_eq!(found[0].what, "31 % of the pixels are no texture: too uniform to be matched");
+        assert_eq!(found[0].what, "31 % of the pixels have no validated depth: too uniform to be matched");
         assert_eq!(found[0].remedy, "More texture or more light.");
-        assert!(found[1].what.starts_with("5 % of the pixels are out of range"), "{found:?}");
+        assert!(found[1].what.ends_with("at an end of the depth range"), "{found:?}");
         assert!(of_statuses(&Value::Null).is_empty());
     }
 
