@@ -24,9 +24,9 @@ export function cloud() {
     points.total ? `There is no fused cloud yet: ${count(points.total, "validated pixel")} of the views that are finished.` : "There are no points yet.";
   section("cloud", "Cloud", lead);
   const place = document.getElementById("cloud");
+  place.append(stage);
   try {
-    if (!document.createElement("canvas").getContext("webgl2")) throw new Error("no WebGL 2");
-    place.append(stage);
+    if (!document.createElement("canvas").getContext("webgl2")) throw new Error("no context for it");
     scene = new Scene3d(canvas);
   } catch (error) {
     scene = null;
