@@ -63,7 +63,7 @@ function controls(legend) {
   turn.addEventListener("click", () => setTurn(!scene.controls.autoRotate));
   scene.stop = () => scene.controls.autoRotate && setTurn(false);
   const reset = element("button", { type: "button", class: "button", onclick: () => { scene.reset(); scene.choose(null); } }, "Reset");
-  const full = element("button", { type: "button", class: "button", onclick: () => stage.requestFullscreen() }, "Full screen");
+  const full = element("button", { type: "button", class: "button full", onclick: () => stage.requestFullscreen() }, "Full screen");
   setMode("photograph");
   setTurn(!matchMedia("(prefers-reduced-motion: reduce)").matches);
   return element("div", { class: "controls" }, element("fieldset", { class: "segments" }, element("legend", {}, "Color"), ...choices),
