@@ -11,8 +11,8 @@ export const mean = (all) => scale(all.reduce(add, [0, 0, 0]), 1 / (all.length |
 
 // Directions to the right and up in a plane that is seen from above; `up` points to the eye, `ahead` up.
 export function groundPlane(up, ahead) {
-  let right = cross(ahead, up);
-  if (length(right) < 1e-3) right = cross(Math.abs(up[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0], up);
-  right = normalize(right);
-  return [right, cross(up, right)];
+    let right = cross(ahead, up);
+    if (length(right) < 1e-3) right = cross(Math.abs(up[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0], up);
+    right = normalize(right);
+    return [right, cross(up, right)];
 }
