@@ -2,7 +2,7 @@
 //! and takes a fingerprint of the source, by which runs in a folder know the program that began them.
 
 use std::hash::{DefaultHasher, Hasher};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 const CMAKE_VERSION_TEMPLATE: &str = "include/cmake/skep-config-version.cmake.in";
 
@@ -23,11 +23,14 @@ fn main() {
         _ => (),
     }
 
-    // Not the Python package, whose changes would compile the crate anew.
+    // Not the Python package and the viewer of reports, whose changes would compile the crate anew.
     for entry in std::fs::read_dir("src").into_iter().flatten().flatten() {
-        if entry.file_name() != "python" {
+        if entry.file_name() != "python" && entry.file_name() != "bin" {
             println!("cargo:rerun-if-changed={}", entry.path().display());
         }
+    }
+    for file in source_files(Path::new("src/bin")) {
+        println!("cargo:rerun-if-changed={}", file.display());
     }
     println!("cargo:rustc-env=SKEP_SOURCE_FINGERPRINT={:08x}", source_fingerprint() as u32);
 
@@ -44,18 +47,24 @@ fn main() {
 
 /// A hash of all files of the source.
 fn source_fingerprint() -> u64 {
+    let mut hasher = DefaultHasher::new();
+    for path in source_files(Path::new("src")) {
+        hasher.write(&std::fs::read(path).unwrap_or_default());
+    }
+    hasher.finish()
+}
+
+/// The files with Rust below a folder, in a fixed order.
+fn source_files(folder: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
-    let mut folders = vec![Path::new("src").to_owned()];
+    let mut folders = vec![folder.to_owned()];
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
             let path = entry.path();
             if path.is_dir() { folders.push(path) } else { files.push(path) }
         }
     }
+    files.retain(|path| path.extension().is_some_and(|extension| extension == "rs"));
     files.sort();
-    let mut hasher = DefaultHasher::new();
-    for path in files.iter().filter(|path| path.extension().is_some_and(|extension| extension == "rs")) {
-        hasher.write(&std::fs::read(path).unwrap_or_default());
-    }
-    hasher.finish()
+    files
 }

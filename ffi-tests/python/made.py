@@ -149,5 +149,5 @@ def scene_folder(folder: Path) -> Path:
 def results(folder: Path) -> dict[str, bytes]:
     """The files of a run that its tasks write."""
     found = {str(path.relative_to(folder)): path for path in folder.rglob("*") if path.is_file()}
-    ours = {name: path for name, path in found.items() if not name.startswith(("run/", "report.json"))}
+    ours = {name: path for name, path in found.items() if not name.startswith(("run/", "report."))}
     return {name: path.read_bytes() for name, path in ours.items()}

@@ -278,7 +278,7 @@
 //   output.write
 //       Files of each view: some of depth, normals, confidence, status, graphs, previews, separated by
 //       commas; with + or - before each name they are added to those of the default or left out.
-//       default: depth,normals,confidence,previews
+//       default: depth,normals,confidence,status,previews
 //   output.cloud_format
 //       Format of the cloud: ply, las or laz.
 //       default: ply

@@ -65,6 +65,7 @@ impl RunFolder {
         let mut files: Vec<PathBuf> = fixed.iter().map(|file| self.0.join(file)).collect();
         files.extend([
             self.report(),
+            self.report_page(),
             self.manifest(),
             self.record(Task::Fuse),
             self.estimate(0, 0, "checked"),
@@ -74,6 +75,11 @@ impl RunFolder {
 
     pub(super) fn report(&self) -> PathBuf {
         self.0.join("report.json")
+    }
+
+    /// The report as a page, which the command line writes.
+    pub(super) fn report_page(&self) -> PathBuf {
+        self.0.join("report.html")
     }
 
     /// Locks the run until the lock is dropped; the system unlocks it when the process ends.

@@ -20,6 +20,7 @@ mod outputs;
 mod photograph;
 mod plan;
 mod run;
+mod state;
 mod task;
 
 use crate::error::{Error, Result};
@@ -44,6 +45,7 @@ pub use needs::Needs;
 use needs::{Least, Shares};
 use plan::Plan;
 pub use run::Summary;
+pub use state::{RunState, ViewState, read_state};
 use std::path::{Path, PathBuf};
 use task::{Content, Record};
 pub use task::{Task, ViewSummary};

@@ -196,6 +196,7 @@ fn keeps_maps(folder: &RunFolder, earlier: &Manifest, manifest: &Manifest) -> bo
 /// Removes the cloud and what says that it is complete.
 fn remove_cloud(folder: &RunFolder, run: u64) -> Result<()> {
     remove(&folder.report())?;
+    remove(&folder.report_page())?;
     if let Some(record) = Record::read(folder, run, Task::Fuse) {
         remove(&folder.record(Task::Fuse))?;
         record.remove_files(folder);
@@ -216,7 +217,7 @@ fn listed(entries: &[String]) -> String {
 /// Removes the records of a run and the files they list.
 pub(super) fn remove_run(folder: &RunFolder) -> Result<()> {
     // A report and a cloud say that what is beside them is complete.
-    for path in [folder.report(), folder.manifest()] {
+    for path in [folder.report(), folder.report_page(), folder.manifest()] {
         remove(&path)?;
     }
     for entry in std::fs::read_dir(folder.tasks()).into_iter().flatten().flatten() {

@@ -86,7 +86,7 @@ impl CloudFormat {
 /// use skep::ViewFiles;
 ///
 /// let more: ViewFiles = "+graphs".parse()?;
-/// assert_eq!(more.to_string(), "depth,normals,confidence,graphs,previews");
+/// assert_eq!(more.to_string(), "depth,normals,confidence,status,graphs,previews");
 /// let only: ViewFiles = "depth,status".parse()?;
 /// assert!(only.depth && only.status && !only.normals);
 /// # Ok::<(), skep::Error>(())
@@ -109,8 +109,8 @@ pub struct ViewFiles {
 
 impl Default for ViewFiles {
     fn default() -> ViewFiles {
-        let (status, graphs) = (false, false);
-        ViewFiles { depth: true, normals: true, confidence: true, status, graphs, previews: true }
+        let graphs = false;
+        ViewFiles { depth: true, normals: true, confidence: true, status: true, graphs, previews: true }
     }
 }
 
@@ -123,6 +123,16 @@ impl ViewFiles {
         status: true,
         graphs: true,
         previews: true,
+    };
+
+    /// No files.
+    pub const NONE: ViewFiles = ViewFiles {
+        depth: false,
+        normals: false,
+        confidence: false,
+        status: false,
+        graphs: false,
+        previews: false,
     };
 
     /// The maps that the fusion reads; of the validated pixels alone.
@@ -188,8 +198,8 @@ mod tests {
     #[test]
     fn lists_of_files_replace_or_change_the_default_and_are_read_as_they_are_displayed() {
         let parsed = |text: &str| text.parse::<ViewFiles>().map(|files| files.to_string());
-        assert_eq!(ViewFiles::default().to_string(), "depth,normals,confidence,previews");
-        assert_eq!(parsed("+graphs, -previews"), Ok("depth,normals,confidence,graphs".to_owned()));
+        assert_eq!(ViewFiles::default().to_string(), "depth,normals,confidence,status,previews");
+        assert_eq!(parsed("+graphs, -previews"), Ok("depth,normals,confidence,status,graphs".to_owned()));
         assert_eq!(parsed("previews,depth"), Ok("depth,previews".to_owned()));
         assert_eq!(ViewFiles::ALL.to_string().parse(), Ok(ViewFiles::ALL));
         for wrong in ["", "depths", "depth,+graphs", "+", "depth,,previews"] {

@@ -22,7 +22,8 @@ fn interrupted(arguments: &[&str], cue: &str, signal: &str) -> (Option<i32>, Str
 /// The results below a folder: all files but those of the run itself and the report with its times.
 pub(super) fn results(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let relative = |path: &Path| path.strip_prefix(folder).unwrap().to_owned();
-    let is_result = |path: &Path| !path.starts_with("run") && !path.ends_with("report.json");
+    let is_report = |path: &Path| path.ends_with("report.json") || path.ends_with("report.html");
+    let is_result = |path: &Path| !path.starts_with("run") && !is_report(path);
     let all = files(folder).into_iter().map(|(path, _)| relative(&path)).filter(|path| is_result(path));
     all.map(|path| (path.clone(), std::fs::read(folder.join(path)).unwrap())).collect()
 }

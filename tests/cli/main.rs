@@ -11,6 +11,7 @@ mod layouts;
 mod outputs;
 mod progress;
 mod refusals;
+mod report;
 mod run_folder;
 
 use layouts::{check_cloud, check_maps};

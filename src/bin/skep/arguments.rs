@@ -33,6 +33,9 @@ pub enum Command {
     /// Fuse existing depth and normal maps, of skep or of COLMAP, into a cloud
     #[command(after_help = FUSE_HELP)]
     Fuse(Fuse),
+    /// Open the report of a run, or serve it while the run goes on
+    #[command(after_help = VIEW_HELP)]
+    View(View),
     /// Write the depth, normal and confidence maps of a workspace in formats of other programs
     Convert(Convert),
     /// Show version, instruction set, threads and every option of the presets, or explain one option
@@ -83,7 +86,7 @@ pub struct Run {
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     memory: Option<u64>,
     #[command(flatten)]
-    files: OutputArguments,
+    pub files: OutputArguments,
     /// Begin anew where a run in the folder would go on
     #[arg(long)]
     pub fresh: bool,
@@ -258,6 +261,21 @@ enum Part {
 }
 
 #[derive(Args)]
+pub struct View {
+    /// Folder of the run
+    pub folder: PathBuf,
+    /// Serve the report to browsers on this machine at http://127.0.0.1:PORT/ until Ctrl-C, instead of
+    /// opening it; 0 takes a free port. While the run goes on, the page shows what is done so far
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8090")]
+    pub serve: Option<u16>,
+    /// Make the page again, also if the run wrote one
+    #[arg(long)]
+    pub fresh: bool,
+    #[command(flatten)]
+    pub resources: Resources,
+}
+
+#[derive(Args)]
 pub struct Info {
     /// Option to explain, with or without its group, such as check.depth_tolerance
     pub option: Option<String>,
@@ -282,6 +300,9 @@ pub struct Fuse {
     /// Leave pixels of a smaller confidence, 0 to 1, out of the cloud; only maps of skep have confidences
     #[arg(long, value_name = "C")]
     min_confidence: Option<f64>,
+    /// Do not write the page report.html, where this is the last task of a run
+    #[arg(long)]
+    pub no_report: bool,
     #[command(flatten)]
     pub resources: Resources,
     #[command(flatten)]
@@ -359,6 +380,7 @@ const EXAMPLES: &str = "\
 Examples:
   skep reconstruct SCENE            maps and cloud of a scene, into SCENE/dense
   skep fuse SCENE/dense             the cloud alone, from existing maps
+  skep view SCENE/dense             the report, in a browser
   skep plan SCENE -o RUN            a run for other processes and machines to do
   skep info                         the options and their values in the presets
   skep info sigma_color             explanation of one option
@@ -392,10 +414,13 @@ Results, in COLMAP's layouts:
   stereo/depth_maps/NAME.photometric.bin    the raw estimate of every pixel
   stereo/depth_maps/NAME.geometric.bin      the validated pixels only
   stereo/normal_maps               likewise; --write +graphs adds stereo/consistency_graphs, the view set
-                                   of each pixel, --write +status stereo/status_maps: docs/formats.md
+                                   of each pixel: docs/formats.md
   stereo/confidence_maps           likewise, as depth maps: the probability of each depth to be within 1 %
+  stereo/status_maps/NAME.png      the status of each pixel: validated, or the reason why it is not
   images, sparse                   copy of the scene, for COLMAP: the folder is a workspace
                                    of `colmap stereo_fusion --workspace_path DIR ...`
+  report.html                      the page to look at and judge the result, for any browser, offline;
+                                   `skep view DIR` opens it; --write -report leaves it out
   report.json                      counts, times and options; written last
   run/                             what is done of the run: the same command goes on after an
                                    interruption (Ctrl-C, a crash, a full disk), --fresh begins anew
@@ -416,6 +441,19 @@ When it fails:
     preview/NAME.views.png shows where too few views see the surface.
   surfaces missing beyond some distance: they are outside the depth range; report.json has the range
     as depth_min and depth_max, --depth-range MIN MAX sets it.";
+
+const VIEW_HELP: &str = "\
+The report is one file, RUN/report.html, without references to others: it can be sent by mail and opened on
+any machine. It shows the cloud with the cameras, each view with photograph, depth, normal, source count,
+confidence and status, the figures of the run, the geometry of the capture, and warnings with what to do.
+Where a run wrote none, or goes on, it is made from the files that are there, as far as they are there.
+
+Examples:
+  skep view SCENE/dense             opens RUN/report.html with the program of the desktop for it
+  skep view SCENE/dense --serve     http://127.0.0.1:8090/, also while the run goes on: load the page again
+                                    for what is done since
+
+A server answers this machine alone, and only requests of the page.";
 
 const PLAN_HELP: &str = "\
 A run is a set of tasks. `skep reconstruct` does all of them; a scheduler does them in this order, those of

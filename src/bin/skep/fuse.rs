@@ -3,6 +3,7 @@
 use crate::arguments::Fuse;
 use crate::interrupt::Interrupt;
 use crate::progress::Display;
+use crate::reconstruct::Conclusion;
 use crate::{Failure, reconstruct, streams, tasks};
 use skep::io::{SceneFolder, Workspace, WorkspaceMaps, WorkspaceView};
 use skep::job::{self, FusedWorkspace, Job, Task};
@@ -56,7 +57,13 @@ pub fn run(arguments: &Fuse, interrupt: &Interrupt) -> Result<(), Failure> {
 fn task(arguments: &Fuse, display: Display, interrupt: &Interrupt) -> Result<(), Failure> {
     let job = Job::open(&arguments.workspace, &arguments.resources.options())?;
     tasks::run(&job, &[Task::Fuse], display, interrupt)?;
-    reconstruct::conclude(&job, &job.summary()?, None, arguments.messages.quiet)
+    let conclusion = Conclusion {
+        stopwatch: None,
+        has_page: !arguments.no_report,
+        dump: None,
+        quiet: arguments.messages.quiet,
+    };
+    reconstruct::conclude(&job, &job.summary()?, conclusion, interrupt)
 }
 
 /// The views without maps, and the number of views without photographs.

@@ -11,10 +11,12 @@ mod plan_files;
 mod progress;
 mod reconstruct;
 mod report;
+mod server;
 mod stopwatch;
 mod streams;
 mod tasks;
 mod time_left;
+mod view;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
@@ -38,6 +40,7 @@ fn main() -> ExitCode {
         Command::Next(arguments) => tasks::next(&arguments, &interrupt),
         Command::Finish(arguments) => tasks::finish(&arguments, &interrupt),
         Command::Fuse(arguments) => fuse::run(&arguments, &interrupt),
+        Command::View(arguments) => view::run(&arguments, &interrupt),
         Command::Convert(arguments) => convert::run(&arguments, &interrupt),
         Command::Info(arguments) => info::run(&arguments),
     };

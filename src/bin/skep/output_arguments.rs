@@ -71,10 +71,11 @@ impl CloudArguments {
 /// The files of a run.
 #[derive(Args)]
 pub struct OutputArguments {
-    /// Files to write for each view: some of depth, normals, confidence, status, graphs, previews; with + or
-    /// - before each they are added to the default or left out [default: depth,normals,confidence,previews]
+    /// Files to write: for each view some of depth, normals, confidence, status, graphs, previews, and
+    /// report, the page report.html; with + or - before each they are added to the default or left out
+    /// [default: depth,normals,confidence,status,previews,report]
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
-    write: Option<ViewFiles>,
+    write: Option<WrittenFiles>,
     #[command(flatten)]
     cloud: CloudArguments,
 }
@@ -86,9 +87,45 @@ impl OutputArguments {
     /// A value out of its range.
     pub fn apply(&self, options: &mut Options) -> Result<()> {
         if let Some(files) = self.write {
-            options.output.write = files;
+            options.output.write = files.of_views;
         }
         self.cloud.apply(options)
+    }
+
+    /// Whether the page is wanted.
+    pub fn has_page(&self) -> bool {
+        self.write.is_none_or(|files| files.page)
+    }
+}
+
+/// The files of a run that are wanted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct WrittenFiles {
+    of_views: ViewFiles,
+    /// `report.html`, which the library does not know.
+    page: bool,
+}
+
+impl std::str::FromStr for WrittenFiles {
+    type Err = skep::Error;
+
+    fn from_str(text: &str) -> Result<WrittenFiles> {
+        const PAGE: &str = "report";
+        let is_page = |entry: &&str| entry.trim().trim_start_matches(['+', '-']) == PAGE;
+        let (pages, others): (Vec<&str>, Vec<&str>) = text.split(',').partition(is_page);
+        let is_change = |entry: &&str| entry.trim().starts_with(['+', '-']);
+        let changes = text.split(',').all(|entry| is_change(&entry));
+        if !changes && pages.iter().any(is_change) {
+            let expected = "all names with + or - before them, or none";
+            return Err(skep::Error::argument("--write", format!("`{text}`"), expected));
+        }
+        let of_views = match (others.is_empty(), changes) {
+            (true, true) => ViewFiles::default(),
+            (true, false) => ViewFiles::NONE,
+            _ => others.join(",").parse()?,
+        };
+        let page = pages.last().map_or(changes, |entry| !entry.trim().starts_with('-'));
+        Ok(WrittenFiles { of_views, page })
     }
 }
 
@@ -125,4 +162,33 @@ pub struct Convert {
     /// Print warnings and errors only
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_is_one_of_the_files() {
+        let parsed = |text: &str| {
+            let files = text.parse::<WrittenFiles>().map_err(|error| error.to_string())?;
+            Ok::<_, String>((files.of_views.to_string(), files.page))
+        };
+        let default = ViewFiles::default().to_string();
+        assert_eq!(parsed("-report"), Ok((default.clone(), false)));
+        assert_eq!(parsed("+report"), Ok((default, true)));
+        assert_eq!(
+            parsed("+graphs, -report").map(|(files, page)| (files.contains("graphs"), page)),
+            Ok((true, false))
+        );
+        assert_eq!(parsed("depth"), Ok(("depth".to_owned(), false)));
+        assert_eq!(parsed("depth,report"), Ok(("depth".to_owned(), true)));
+        assert_eq!(parsed("report"), Ok((String::new(), true)));
+        assert_eq!(parsed("+graphs").map(|(_, page)| page), Ok(true));
+        assert!(
+            parsed("depth,-report").is_err()
+                && parsed("+depth,report").is_err()
+                && parsed("reports").is_err()
+        );
+    }
 }

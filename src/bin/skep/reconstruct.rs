@@ -1,10 +1,10 @@
-//! `skep reconstruct`: maps, previews, cloud and report of a scene folder.
+//! `skep reconstruct`: maps, previews, cloud and reports of a scene folder.
 
 use crate::arguments::{Reconstruct, Run};
 use crate::interrupt::Interrupt;
 use crate::progress::Display;
-use crate::report::{Report, Totals};
-use crate::stopwatch::{Stage, Stopwatch, Times};
+use crate::report::{self, PAGE_NAME, PageOptions, Report, RunFiles, Totals};
+use crate::stopwatch::{Stage, Stopwatch};
 use crate::{Failure, dump, streams};
 use skep::job::{Job, Needs, Summary};
 use skep::{DepthRange, Error, Options, PixelStatus, Progress, Result, format_bytes};
@@ -32,10 +32,10 @@ pub fn run(arguments: &Reconstruct, interrupt: &Interrupt) -> std::result::Resul
     let report = report_path(&output);
     if job.is_complete() && report.is_file() {
         display.print("the run was complete before: its files are compared with what it wrote");
-    } else if let Err(error) = std::fs::remove_file(&report)
-        && error.kind() != std::io::ErrorKind::NotFound
-    {
-        return Err(Error::file(report, format!("cannot be replaced: {error}")).into());
+    } else {
+        for file in [report, output.join(PAGE_NAME)] {
+            remove(&file)?;
+        }
     }
     let result = with_progress(&job, arguments, display, &stopwatch, interrupt).inspect_err(|error| {
         if *error == Error::Cancelled {
@@ -46,27 +46,87 @@ pub fn run(arguments: &Reconstruct, interrupt: &Interrupt) -> std::result::Resul
 
     let mut stopwatch = stopwatch.into_inner().unwrap_or_else(PoisonError::into_inner);
     stopwatch.enter(Stage::Writing);
-    conclude(&job, &result, Some(stopwatch.times()), run.messages.quiet)
+    let conclusion = Conclusion {
+        stopwatch: Some(stopwatch),
+        has_page: run.files.has_page(),
+        dump: arguments.dump.as_deref(),
+        quiet: run.messages.quiet,
+    };
+    conclude(&job, &result, conclusion, interrupt)
 }
 
-/// Writes the report of a complete run, and says what the run made. `times` are those of the whole run.
+fn remove(file: &Path) -> Result<()> {
+    match std::fs::remove_file(file) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(Error::file(file, format!("cannot be replaced: {error}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// How a run is concluded.
+pub struct Conclusion<'a> {
+    /// What measured the whole run; `None` where several processes did it.
+    pub stopwatch: Option<Stopwatch>,
+    /// Whether the page is written.
+    pub has_page: bool,
+    /// The folder with the pictures of every cycle.
+    pub dump: Option<&'a Path>,
+    pub quiet: bool,
+}
+
+/// Writes the reports of a complete run, and says what the run made.
 pub fn conclude(
     job: &Job,
     result: &Summary,
-    times: Option<Times>,
-    quiet: bool,
+    conclusion: Conclusion,
+    interrupt: &Interrupt,
 ) -> std::result::Result<(), Failure> {
+    let Conclusion { stopwatch, has_page, dump, quiet } = conclusion;
     let mut report = Report::new(job, result);
     let scene = job.scene();
     let ranges: Vec<DepthRange> = (0..scene.views().len()).map(|view| scene.depth_range(view)).collect();
     let warning = few_points_warning(&report.totals, &ranges, job.options());
     report.warnings.extend(warning.clone());
-    if let Some(times) = times {
-        report.set_times(times);
-    }
-    // One that is there is of the process that did the work, with its times.
     let output = job.workspace().folder();
-    if !report_path(output).is_file() {
+    // Reports that are there are of the process that did the work, with its times.
+    let is_reported = report_path(output).is_file();
+    let page_path = output.join(PAGE_NAME);
+    if !is_reported {
+        // One of the run before it was complete.
+        remove(&page_path)?;
+    }
+    let page = match has_page && !page_path.is_file() {
+        true => {
+            let files = match is_reported {
+                true => RunFiles::find(output)?,
+                false => RunFiles::of_run(output, report.to_value())?,
+            };
+            let options = PageOptions {
+                threads: skep::thread_count(scene, job.options()),
+                memory: job.needs().memory,
+                dump: dump.map(Path::to_owned),
+                goes_on: &|| interrupt.control_flow().is_continue(),
+            };
+            let page = report::make(&files, &options).inspect_err(|error| {
+                if *error == Error::Cancelled {
+                    streams::notice(
+                        "interrupted: maps and cloud are done; the same command writes the reports",
+                    );
+                }
+            })?;
+            Some((page, files))
+        }
+        false => None,
+    };
+    if let Some(mut stopwatch) = stopwatch {
+        report.set_times(stopwatch.times());
+    }
+    if let Some((page, files)) = &page {
+        let figures = if is_reported { files.report.clone() } else { report.to_value() };
+        report::write(page, files, &figures)?;
+    }
+    if !is_reported {
         report.write(&report_path(output))?;
     }
     warning.iter().for_each(|warning| streams::warning(warning));
@@ -179,6 +239,10 @@ fn summary(job: &Job, ranges: &[DepthRange], totals: &Totals) -> Vec<String> {
         lines.push(format!("previews such as {}", workspace.preview(first, "depth").display()));
     }
     lines.push(format!("maps in {}", output.join("stereo").display()));
+    let page = output.join(PAGE_NAME);
+    if page.is_file() {
+        lines.push(format!("report in {}; `skep view {}` opens it", page.display(), output.display()));
+    }
     lines.push(format!("counts and times in {}", report_path(output).display()));
     lines.extend(totals.wall_seconds.map(|seconds| format!("done in {seconds:.1} s")));
     lines
@@ -247,7 +311,7 @@ fn few_points_warning(totals: &Totals, ranges: &[DepthRange], options: &Options)
 }
 
 /// What a status says about the scene, and the remedy.
-fn help(status: PixelStatus) -> &'static str {
+pub fn help(status: PixelStatus) -> &'static str {
     match status {
         PixelStatus::Validated => {
             "validated, but confirmed by fewer views than fusion needs: more views of each surface"

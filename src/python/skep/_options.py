@@ -264,7 +264,7 @@ class Options(Mapping[str, Value]):
     output_write: str
     """Files of each view: some of depth, normals, confidence, status, graphs, previews, separated by commas;
     with + or - before each name they are added to those of the default or left out. (text; default:
-    depth,normals,confidence,previews)"""
+    depth,normals,confidence,status,previews)"""
     output_cloud_format: str
     """Format of the cloud: ply, las or laz. (name; default: ply)"""
     output_splat: bool

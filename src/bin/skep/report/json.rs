@@ -73,6 +73,10 @@ pub struct CycleReport {
     pixels: u64,
     changed: u64,
     validated: u64,
+    /// Median distance between projected planes and the depths of the sources, in pixels of the scale; of a
+    /// view only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    median_residual: Option<f64>,
 }
 
 impl Report {
@@ -103,6 +107,11 @@ impl Report {
         self.totals.peak_resident_bytes = peak_resident_bytes();
     }
 
+    /// The content of the file.
+    pub fn to_value(&self) -> Value {
+        serde_json::to_value(self).unwrap_or_default()
+    }
+
     /// Writes the file, whole or not at all.
     pub fn write(&self, path: &Path) -> Result<()> {
         skep::io::write_file(path, |out| {
@@ -122,7 +131,7 @@ fn preset_of(options: &Options) -> Option<&'static str> {
 }
 
 /// An option's value as JSON.
-fn typed(value: OptionValue) -> Value {
+pub(super) fn typed(value: OptionValue) -> Value {
     match value {
         OptionValue::Count(value) => value.into(),
         OptionValue::Number(value) => value.into(),
@@ -197,18 +206,24 @@ fn view_report(job: &Job, index: usize, result: &ViewSummary) -> ViewReport {
         ncc_evaluations: result.counts.ncc_evaluations,
         bilinear_samples: result.counts.bilinear_samples,
         early_terminations: result.counts.early_terminations,
-        cycles: result.cycles.iter().map(CycleReport::from).collect(),
+        cycles: result.cycles.iter().map(CycleReport::of_view).collect(),
     }
 }
 
-fn by_name(counts: [u64; PixelStatus::ALL.len()]) -> BTreeMap<&'static str, u64> {
+pub(super) fn by_name(counts: [u64; PixelStatus::ALL.len()]) -> BTreeMap<&'static str, u64> {
     PixelStatus::ALL.iter().map(|status| status.name()).zip(counts).collect()
+}
+
+impl CycleReport {
+    fn of_view(record: &CycleRecord) -> CycleReport {
+        CycleReport { median_residual: Some(record.median_residual), ..record.into() }
+    }
 }
 
 impl From<&CycleRecord> for CycleReport {
     fn from(cycle: &CycleRecord) -> CycleReport {
         let &CycleRecord { downscale, cycle, pixels, changed, validated, .. } = cycle;
-        CycleReport { downscale, cycle, pixels, changed, validated }
+        CycleReport { downscale, cycle, pixels, changed, validated, median_residual: None }
     }
 }
 
