@@ -115,7 +115,7 @@ impl std::str::FromStr for WrittenFiles {
         let (pages, others): (Vec<&str>, Vec<&str>) = text.split(',').partition(is_page);
         let is_change = |entry: &&str| entry.trim().starts_with(['+', '-']);
         let changes = text.split(',').all(|entry| is_change(&entry));
-        if !changes && pages.iter().any(is_change) {
+        if !changes && text.split(',').any(|entry| is_change(&entry)) {
             let expected = "all names with + or - before them, or none";
             return Err(skep::Error::argument("--write", format!("`{text}`"), expected));
         }
