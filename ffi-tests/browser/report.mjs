@@ -255,15 +255,15 @@ tests["values under the cursor are those of the maps, within their quantisation"
             if (compared++ > 3) continue;
             const sure = await read("confidence", /: confidence ([\d.]+)/);
             assert.ok(
-                Math.abs(Number(sure.found[1]) - confidence.at(x, y)) <= 0.0101,
-                `${sure.text}; the map has ${confidence.at(x, y)}`,
+                Math.abs(Number(sure.found[1]) - confidence.at(sure.x, sure.y)) <= 0.0101,
+                `${sure.text}; the map has ${confidence.at(sure.x, sure.y)}`,
             );
             const facing = await read("normal", /: normal \((.*?)\)/);
             facing.found[1].split(", ").forEach((component, axis) => {
                 const own = Number(component.replace("\u2212", "-"));
                 assert.ok(
-                    Math.abs(own - normal.at(x, y, axis)) < 0.022,
-                    `${facing.text}; the map has ${normal.at(x, y, axis)} at ${axis}`,
+                    Math.abs(own - normal.at(facing.x, facing.y, axis)) < 0.022,
+                    `${facing.text}; the map has ${normal.at(facing.x, facing.y, axis)} at ${axis}`,
                 );
             });
         }
