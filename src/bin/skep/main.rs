@@ -3,6 +3,7 @@
 mod arguments;
 mod convert;
 mod dump;
+mod evaluate;
 mod fuse;
 mod info;
 mod interrupt;
@@ -39,6 +40,7 @@ fn main() -> ExitCode {
         Command::Finish(arguments) => tasks::finish(&arguments, &interrupt),
         Command::Fuse(arguments) => fuse::run(&arguments, &interrupt),
         Command::Convert(arguments) => convert::run(&arguments, &interrupt),
+        Command::Evaluate(arguments) => evaluate::run(&arguments, &interrupt),
         Command::Info(arguments) => info::run(&arguments),
     };
     match result {
