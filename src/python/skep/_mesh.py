@@ -24,6 +24,8 @@ _DEPTHS = range(4, 15)
 _PIXELS_PER_VOXEL = 2.0
 # Distances to the surface are kept within so many voxels; the usual ratio.
 _TRUNCATION = 4.0
+# Views that must have averaged a voxel.
+_LEAST_VIEWS = 3.0
 # Pixels of a map that the size of voxels is estimated from.
 _SAMPLE = 7
 
@@ -71,7 +73,8 @@ def poisson(cloud: Path, depth: int = 9, trim: float = 0.05) -> Any:
 
 def tsdf(run: Path, voxel: float | None = None) -> Any:
     """The surface of the validated depth maps of a run, an `open3d.geometry.TriangleMesh`: signed distances
-    are averaged in voxels, and cut off four voxels from the surface.
+    are averaged in voxels, and cut off four voxels from the surface. It is where three views or more have
+    depths, as many as confirm a depth by default.
 
     `voxel` is the side of a voxel in units of the scene; None takes twice the median size of a pixel on the
     surface. Vertices have the colors of the photographs.
@@ -79,30 +82,35 @@ def tsdf(run: Path, voxel: float | None = None) -> Any:
     if voxel is not None and not (np.isfinite(voxel) and voxel > 0):
         raise ArgumentError(f"voxel is {voxel}: must be a length above 0")
     library = open3d()
+    core, geometry = library.core, library.t.geometry
     side = voxel if voxel is not None else voxel_size(run)
-    integration = library.pipelines.integration
-    volume = integration.ScalableTSDFVolume(
-        voxel_length=side, sdf_trunc=_TRUNCATION * side, color_type=integration.TSDFVolumeColorType.RGB8
+    grid = geometry.VoxelBlockGrid(
+        ("tsdf", "weight", "color"),
+        (core.float32, core.float32, core.float32),
+        ((1,), (1,), (3,)),
+        side,
+        block_resolution=16,
+        block_count=10_000,
     )
+    # The grid computes in 32 bits, which geographic coordinates do not fit: the first camera is its origin.
+    origin: NDArray[np.float64] | None = None
     for view in mapped_views(run):
-        height, width = view.depth.shape
-        K = view.camera.K
-        # Both have the center of the top-left pixel at (0, 0).
-        pinhole = library.camera.PinholeCameraIntrinsic(width, height, K[0, 0], K[1, 1], K[0, 2], K[1, 2])
+        origin = view.camera.center if origin is None else origin
         pose = np.eye(4)
-        pose[:3, :3], pose[:3, 3] = view.camera.R, view.camera.t
-        image = library.geometry.RGBDImage.create_from_color_and_depth(
-            _photograph(library, view),
-            library.geometry.Image(np.ascontiguousarray(view.depth)),
-            depth_scale=1.0,
-            depth_trunc=float(view.depth.max()) * 2,
-            convert_rgb_to_intensity=False,
-        )
-        volume.integrate(image, pinhole, pose)
-    return volume.extract_triangle_mesh()
+        pose[:3, :3], pose[:3, 3] = view.camera.R, view.camera.t + view.camera.R @ origin
+        # Both have the center of the top-left pixel at (0, 0).
+        cameras = core.Tensor(view.camera.K), core.Tensor(pose)
+        depth = geometry.Image(core.Tensor(np.ascontiguousarray(view.depth)))
+        # With depths of floats it takes colors of floats only, 0 to 1.
+        color = geometry.Image(core.Tensor(_photograph(library, view).astype(np.float32) / 255))
+        scale_and_reach = 1.0, float(view.depth.max()) * 2, _TRUNCATION
+        blocks = grid.compute_unique_block_coordinates(depth, *cameras, *scale_and_reach)
+        grid.integrate(blocks, depth, color, *cameras, *scale_and_reach)
+    mesh = grid.extract_triangle_mesh(weight_threshold=_LEAST_VIEWS).to_legacy()
+    return mesh.translate(origin)
 
 
-def _photograph(library: Any, view: MappedView) -> Any:
+def _photograph(library: Any, view: MappedView) -> NDArray[np.uint8]:
     """The photograph of a view in three channels of 8 bits."""
     if not view.photograph.is_file():
         raise FileError(f"{view.photograph}: no such file; expected the photograph of {view.name}")
@@ -113,9 +121,9 @@ def _photograph(library: Any, view: MappedView) -> Any:
         raise FileError(f"{view.photograph}: is {found}; expected {expected}, the size of the depth map")
     if pixels.dtype == np.uint16:
         pixels = (pixels >> 8).astype(np.uint8)
-    if pixels.ndim == 2:
-        pixels = np.repeat(pixels[..., None], 3, axis=2)
-    return library.geometry.Image(np.ascontiguousarray(pixels[..., :3]))
+    if pixels.ndim == 2 or pixels.shape[2] < 3:
+        pixels = np.repeat(np.atleast_3d(pixels)[..., :1], 3, axis=2)
+    return np.ascontiguousarray(pixels[..., :3])
 
 
 def mapped_views(run: Path) -> Iterator[MappedView]:
@@ -208,6 +216,8 @@ def main(arguments: Sequence[str]) -> int:
     if output.suffix.lower() not in _ENDINGS:
         raise ArgumentError(f"--output is {output}: must end in one of {', '.join(_ENDINGS)}")
     library = open3d()
+    # Its warnings about single vertices go to standard output.
+    library.utility.set_verbosity_level(library.utility.VerbosityLevel.Error)
     if given.method == "poisson":
         mesh = poisson(given.cloud or given.run / "fused.ply", given.depth, given.trim)
     else:

@@ -1,10 +1,10 @@
 //! Clouds against true ones.
 
 use super::arguments::{DistanceArguments, Outliers, Thinning};
+use super::kd_tree::KdTree;
 use super::scores::{Histogram, Rates};
 use super::thinning::thin;
 use super::work::Work;
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use serde::Serialize;
 use skep::{Error, Result};
 
@@ -117,7 +117,7 @@ pub struct CloudScores {
 /// Measures all distances.
 ///
 /// # Errors
-/// Points that a tree cannot hold; the user asked to stop.
+/// The user asked to stop.
 pub fn compare(work: &Work, points: usize, sides: &Sides, settings: &Settings) -> Result<CloudScores> {
     let to_truth = nearest(work, "distances to the truth", sides.judged, sides.truth)?;
     let to_cloud = nearest(work, "distances to the cloud", sides.wanted, sides.cloud)?;
@@ -156,15 +156,10 @@ fn nearest(work: &Work, what: &str, points: &[[f64; 3]], others: &[[f64; 3]]) ->
     if others.is_empty() {
         return Ok(vec![f64::INFINITY; points.len()]);
     }
-    let tree: ImmutableKdTree<f64, 3> = ImmutableKdTree::new_from_slice(others).map_err(|error| {
-        Error::argument("cloud", format!("{} points", others.len()), format!("{error:?}"))
-    })?;
+    let tree = work.on_threads(|| KdTree::new(others.to_vec()));
     let chunks: Vec<&[[f64; 3]]> = points.chunks(CHUNK).collect();
     let distances = work.map(what, &chunks, |chunk| {
-        let distance = |point: &[f64; 3]| {
-            tree.query(point).nearest_one::<SquaredEuclidean<f64>>().execute().distance.sqrt()
-        };
-        Ok(chunk.iter().map(distance).collect::<Vec<f64>>())
+        Ok(chunk.iter().map(|point| tree.distance(point)).collect::<Vec<f64>>())
     })?;
     Ok(distances.concat())
 }

@@ -1,6 +1,6 @@
 //! Observation masks and ground planes of the DTU data set, in MATLAB files of version 5.
 
-use matfile::{Array, MatFile, NumericData};
+use super::matlab::{self, Array};
 use skep::{Error, Result};
 use std::path::Path;
 
@@ -24,29 +24,26 @@ pub struct Mask {
 /// # Errors
 /// A file that is missing, damaged, of version 7.3, or lacks one of them.
 pub fn read_mask(path: &Path) -> Result<Mask> {
-    let file = open(path)?;
-    let (mask, corners, resolution) = (array(path, &file, "ObsMask")?, array(path, &file, "BB")?, "Res");
-    let resolution = numbers(array(path, &file, resolution)?);
-    let wrong = |name: &str, found: &Array, expected: &str| {
-        Err(Error::file(path, format!("{name} is an array of {:?}; expected {expected}", found.size())))
+    let arrays = matlab::read(path)?;
+    let (mask, corners) = (array(path, &arrays, "ObsMask")?, array(path, &arrays, "BB")?);
+    let resolution = &array(path, &arrays, "Res")?.values;
+    let wrong = |found: &Array, expected: &str| {
+        let Array { name, size, .. } = found;
+        Err(Error::file(path, format!("{name} is an array of {size:?}; expected {expected}")))
     };
-    let values = numbers(mask);
-    let Ok(size) = <[usize; 3]>::try_from(mask.size().clone()) else {
-        return wrong("ObsMask", mask, "three dimensions of voxels");
+    let Ok(size) = <[usize; 3]>::try_from(mask.size.clone()) else {
+        return wrong(mask, "three dimensions of voxels");
     };
-    if Some(values.len()) != size.iter().try_fold(1usize, |product, side| product.checked_mul(*side)) {
-        return wrong("ObsMask", mask, "as many values as its size says");
-    }
-    let corner = numbers(corners);
-    if corners.size() != &[2, 3] || !corner.iter().all(|number| number.is_finite()) {
-        return wrong("BB", corners, "2 x 3 finite numbers");
+    let corner = &corners.values;
+    if corners.size != [2, 3] || !corner.iter().all(|number| number.is_finite()) {
+        return wrong(corners, "2 x 3 finite numbers");
     }
     let resolution = match resolution[..] {
         [resolution] if resolution.is_finite() && resolution > 0.0 => resolution,
         _ => return Err(Error::file(path, format!("Res is {resolution:?}; expected a number above 0"))),
     };
     Ok(Mask {
-        is_observed: values.iter().map(|value| *value != 0.0).collect(),
+        is_observed: mask.values.iter().map(|value| *value != 0.0).collect(),
         size,
         // MATLAB stores columns one after the other.
         origin: [corner[0], corner[2], corner[4]],
@@ -74,13 +71,11 @@ impl Mask {
 /// # Errors
 /// A file that is missing, damaged, of version 7.3, or lacks it.
 pub fn read_plane(path: &Path) -> Result<[f64; 4]> {
-    let file = open(path)?;
-    let found = array(path, &file, "P")?;
-    match <[f64; 4]>::try_from(numbers(found)) {
-        Ok(plane) if plane.iter().all(|number| number.is_finite()) => Ok(plane),
-        _ => {
-            Err(Error::file(path, format!("P is an array of {:?}; expected 4 finite numbers", found.size())))
-        }
+    let arrays = matlab::read(path)?;
+    let Array { size, values, .. } = array(path, &arrays, "P")?;
+    match values[..] {
+        [a, b, c, d] if values.iter().all(|number| number.is_finite()) => Ok([a, b, c, d]),
+        _ => Err(Error::file(path, format!("P is an array of {size:?}; expected 4 finite numbers"))),
     }
 }
 
@@ -89,35 +84,9 @@ pub fn is_above(plane: &[f64; 4], point: &[f64; 3]) -> bool {
     plane[0] * point[0] + plane[1] * point[1] + plane[2] * point[2] + plane[3] > 0.0
 }
 
-fn open(path: &Path) -> Result<MatFile> {
-    let bytes = std::fs::read(path).map_err(|error| Error::file(path, format!("cannot be read: {error}")))?;
-    if bytes.starts_with(b"MATLAB 7.3") {
-        let problem = "a MATLAB file of version 7.3; expected version 5 (in MATLAB: save -v7)";
-        return Err(Error::file(path, problem));
-    }
-    MatFile::parse(bytes.as_slice())
-        .map_err(|error| Error::file(path, format!("expected a MATLAB file of version 5: {error}")))
-}
-
-fn array<'a>(path: &Path, file: &'a MatFile, name: &str) -> Result<&'a Array> {
-    file.find_by_name(name).ok_or_else(|| {
-        let names: Vec<&str> = file.arrays().iter().map(Array::name).collect();
+fn array<'a>(path: &Path, arrays: &'a [Array], name: &str) -> Result<&'a Array> {
+    arrays.iter().find(|array| array.name == name).ok_or_else(|| {
+        let names: Vec<&str> = arrays.iter().map(|array| array.name.as_str()).collect();
         Error::file(path, format!("no array of numbers {name}; it has: {}", names.join(", ")))
     })
-}
-
-/// The values of an array, column after column.
-fn numbers(array: &Array) -> Vec<f64> {
-    match array.data() {
-        NumericData::Int8 { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
-        NumericData::UInt8 { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
-        NumericData::Int16 { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
-        NumericData::UInt16 { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
-        NumericData::Int32 { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
-        NumericData::UInt32 { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
-        NumericData::Int64 { real, .. } => real.iter().map(|value| *value as f64).collect(),
-        NumericData::UInt64 { real, .. } => real.iter().map(|value| *value as f64).collect(),
-        NumericData::Single { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
-        NumericData::Double { real, .. } => real.clone(),
-    }
 }

@@ -6,6 +6,8 @@ mod depth;
 mod dtu;
 mod float_maps;
 mod held_out;
+mod kd_tree;
+mod matlab;
 mod pictures;
 mod plots;
 mod points;
