@@ -313,7 +313,7 @@ fn masks_and_planes_of_dtu_choose_the_points_that_count() {
     assert_eq!(found["cloud"]["truth_points"], 300);
     close(&found["cloud"]["accuracy"], 1.0);
     // Below the high half the nearest points are those at x = 9, but none is nearer than 20 beyond x = 29.
-    let expected: f64 = (5..20).map(|x| f64::from(1 + (x - 9).max(0).pow(2)).sqrt()).sum::<f64>() / 15.0;
+    let expected: f64 = (5..20i32).map(|x| f64::from(1 + (x - 9).max(0).pow(2)).sqrt()).sum::<f64>() / 15.0;
     close(&found["cloud"]["completeness"], expected);
 
     let without = file(&folder, "without.mat");
@@ -401,7 +401,6 @@ fn photographs_are_left_out_and_judge_the_reconstruction_of_the_others() {
         &words(&output),
         "--preset",
         "fast",
-        "--quiet",
         "--",
         "--schedule",
         schedule,

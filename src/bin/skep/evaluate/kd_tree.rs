@@ -1,7 +1,7 @@
 //! The distance to the nearest of many points.
 //!
-//! The tree is the array of the points itself: the middle one of a part splits it in the median along an axis,
-//! so there is nothing to store but the axis of each.
+//! The tree is the array of the points itself: the middle one of a part splits it in the median along an
+//! axis, so there is nothing to store but the axis of each.
 
 /// Points of a part that are looked at one by one.
 const LEAF: usize = 16;

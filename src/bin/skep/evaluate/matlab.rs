@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! 116 bytes of text  u64  u16 version  "IM" (little-endian)
-//! elements: u32 type  u32 bytes  data, filled up to 8 bytes; up to 4 bytes of data: u16 type  u16 bytes  data
+//! elements: u32 type  u32 bytes  data, filled up to 8 bytes
+//!           or, of 4 bytes at most: u16 type  u16 bytes  data, filled up to 4 bytes
 //! an array is an element of elements: flags (class), sizes (i32), name, values; or that, compressed by zlib
 //! ```
 

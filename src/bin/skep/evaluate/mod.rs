@@ -60,7 +60,9 @@ pub fn run(arguments: &Evaluate, interrupt: &Interrupt) -> std::result::Result<(
     if let Some(folder) = &arguments.plots {
         pictures::draw(&scores, folder)?;
     }
-    lines.iter().for_each(|line| streams::result(line));
+    if !arguments.messages.quiet {
+        lines.iter().for_each(|line| streams::result(line));
+    }
     Ok(())
 }
 
@@ -211,7 +213,7 @@ fn clouds(
     region.crop(&mut cloud);
     region.crop(&mut truth);
     if truth.is_empty() {
-        return Err(Error::file(truth_file, format!("none of its points lies within the region")).into());
+        return Err(Error::file(truth_file, "none of its points lies within the region").into());
     }
     let cloud = settings.thin(work, cloud, 0)?;
     let truth = settings.thin(work, truth, 1)?;

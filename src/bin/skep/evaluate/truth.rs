@@ -100,8 +100,8 @@ impl Truth {
     /// A picture of integers that are multiplied by the scale.
     fn picture(&self, path: &Path) -> Result<Grid<f32>> {
         let Some(scale) = self.scale else {
-            let problem = "its integers are depths in an unknown unit; expected --depth-scale S, the depth of \
-                           the value 1, or a scene.json with depth_scale";
+            let problem = "its integers are depths in an unknown unit; expected --depth-scale S, the \
+                           depth of the value 1, or a scene.json with depth_scale";
             return Err(Error::file(path, problem));
         };
         let scaled = |value: f64| (value * scale) as f32;
