@@ -189,9 +189,7 @@ fn read_views(scene: &Path, options: &Options, left_out: &[String]) -> Result<Ve
     let failed = |error| Error::argument("--views", "a list in a temporary file", format!("space ({error})"));
     let mut list = tempfile::NamedTempFile::new().map_err(failed)?;
     chosen.iter().try_for_each(|name| writeln!(list, "{name}")).map_err(failed)?;
-    let mut reading = Options::default();
-    reading.threads = options.threads;
-    reading.memory = options.memory;
+    let mut reading = Options { threads: options.threads, memory: options.memory, ..Options::default() };
     reading.input.max_image_size = options.input.max_image_size;
     reading.input.images = list.path().to_string_lossy().into_owned();
     // No depth is asked for, and some scenes have no points to derive one from.

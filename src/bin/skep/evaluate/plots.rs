@@ -12,6 +12,8 @@ const SIZE: (u32, u32) = (720, 440);
 /// Colors of up to three series, which differ in lightness too.
 const COLORS: [RGBColor; 3] = [RGBColor(31, 119, 180), RGBColor(214, 120, 20), RGBColor(60, 60, 60)];
 const FONT: &str = "sans-serif";
+/// Names of views below bars.
+const MOST_NAMES: usize = 40;
 
 /// A named line or row of bars.
 pub struct Series<'a, T> {
@@ -75,21 +77,14 @@ pub fn histogram(path: &Path, title: &str, x_label: &str, histogram: &Histogram)
 pub fn bars(path: &Path, title: &str, names: &[&str], series: &[Series<f64>]) -> Result<()> {
     draw(path, |area| {
         let views = names.len();
+        // The legend lies above the bars, the names below them.
         let mut chart = ChartBuilder::on(&area)
             .caption(title, (FONT, 18))
             .margin(14)
-            .x_label_area_size(40)
+            .x_label_area_size(120)
             .y_label_area_size(48)
-            .build_cartesian_2d(0.0..views as f64, 0.0..1.0)?;
-        // A tick in the middle of each group of bars.
-        let name = |place: &f64| names.get(place.floor() as usize).copied().unwrap_or_default().to_owned();
-        chart
-            .configure_mesh()
-            .disable_x_mesh()
-            .light_line_style(WHITE)
-            .x_labels(views.min(12))
-            .x_label_formatter(&name)
-            .draw()?;
+            .build_cartesian_2d(0.0..views as f64, 0.0..1.25)?;
+        chart.configure_mesh().disable_x_mesh().light_line_style(WHITE).x_labels(0).draw()?;
         let width = 0.8 / series.len() as f64;
         for (index, (series, color)) in series.iter().zip(COLORS).enumerate() {
             let rectangle = |(view, value): (usize, &f64)| {
@@ -101,7 +96,18 @@ pub fn bars(path: &Path, title: &str, names: &[&str], series: &[Series<f64>]) ->
                 .label(series.name)
                 .legend(move |(x, y)| Rectangle::new([(x, y - 4), (x + 16, y + 4)], color.filled()));
         }
-        chart.configure_series_labels().background_style(WHITE.mix(0.8)).draw()?;
+        let style = (FONT, 11).into_font().transform(FontTransform::Rotate90);
+        // Of many views some names.
+        let labels = names.iter().enumerate().step_by(views.div_ceil(MOST_NAMES));
+        let label = |(view, name): (usize, &&str)| {
+            Text::new((*name).to_owned(), (view as f64 + 0.6, -0.03), style.clone())
+        };
+        chart.draw_series(labels.map(label))?;
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::UpperRight)
+            .background_style(WHITE.mix(0.8))
+            .draw()?;
         Ok(area.present()?)
     })
 }
