@@ -2,6 +2,7 @@
 #![cfg(feature = "cli")]
 
 mod dump;
+mod evaluate;
 mod fuse;
 mod import;
 #[cfg(unix)]

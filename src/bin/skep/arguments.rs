@@ -38,6 +38,9 @@ pub enum Command {
     View(View),
     /// Write the depth, normal and confidence maps of a workspace in formats of other programs
     Convert(Convert),
+    /// Score depth maps and clouds against ground truth, or against photographs that were left out
+    #[command(after_help = crate::evaluate::HELP)]
+    Evaluate(Box<crate::evaluate::Evaluate>),
     /// Show version, instruction set, threads and every option of the presets, or explain one option
     Info(Info),
 }

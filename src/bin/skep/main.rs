@@ -3,6 +3,7 @@
 mod arguments;
 mod convert;
 mod dump;
+mod evaluate;
 mod fuse;
 mod info;
 mod interrupt;
@@ -42,6 +43,7 @@ fn main() -> ExitCode {
         Command::Fuse(arguments) => fuse::run(&arguments, &interrupt),
         Command::View(arguments) => view::run(&arguments, &interrupt),
         Command::Convert(arguments) => convert::run(&arguments, &interrupt),
+        Command::Evaluate(arguments) => evaluate::run(&arguments, &interrupt),
         Command::Info(arguments) => info::run(&arguments),
     };
     match result {

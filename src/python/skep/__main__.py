@@ -2,6 +2,7 @@
 
 Runs the program `skep` of Rust where PATH has it, with all arguments as they are. The package does not
 contain that program; without it `reconstruct` with the arguments below and `--version` work all the same.
+`mesh` is always the package's own.
 """
 
 from __future__ import annotations
@@ -13,12 +14,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import skep
+from skep import _mesh
 
 _PROGRAM = "skep"
-_COMMANDS = ("reconstruct", "plan", "search", "check", "next", "finish", "fuse", "info", "help")
+_COMMANDS = tuple(
+    "reconstruct plan search check next finish fuse convert evaluate info help".split()
+)
 _MISSING = (
     "skep: '{}' needs the program skep, which PATH does not have; 'cargo install --path . --features cli' in "
-    "the source of skep installs it. The Python package alone has 'reconstruct' and --version"
+    "the source of skep installs it. The Python package alone has 'reconstruct', 'mesh' and --version"
 )
 
 
@@ -27,19 +31,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     interrupted. Wrong arguments exit with 2.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
-    program = find_program()
+    is_mesh = given[:1] == ["mesh"]
+    program = None if is_mesh else find_program()
     if program is not None:
         os.execv(program, [_PROGRAM, *given])
     if given and given[0] in _COMMANDS and given[0] != "reconstruct":
         print(_MISSING.format(given[0]), file=sys.stderr)
         return 2
     try:
+        if is_mesh:
+            return _mesh.main(given[1:])
         return _reconstruct(_parser().parse_args(given or ["--help"]))
+    except ImportError as error:
+        print(f"skep: {error}", file=sys.stderr)
+        return 1
     except skep.Error as error:
         print(f"\nskep: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("\nskep: interrupted; the same command goes on where it stopped", file=sys.stderr)
+        rest = "" if is_mesh else "; the same command goes on where it stopped"
+        print(f"\nskep: interrupted{rest}", file=sys.stderr)
         return 130
 
 
@@ -57,7 +68,10 @@ def find_program() -> str | None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(_PROGRAM, description="Dense multi-view stereo on the CPU.")
     parser.add_argument("--version", action="version", version=f"skep {skep.__version__}")
-    command = parser.add_subparsers(required=True, metavar="COMMAND").add_parser(
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    # `main` takes it before; here it is only listed.
+    commands.add_parser("mesh", help="make a mesh of the results of a run", add_help=False)
+    command = commands.add_parser(
         "reconstruct", help="estimate depth maps and a cloud of a COLMAP scene; goes on after Ctrl-C"
     )
     add = command.add_argument
