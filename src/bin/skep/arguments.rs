@@ -1,9 +1,10 @@
 //! The arguments of the command line, and their help.
 
-use crate::output_arguments::{CloudArguments, Convert, OutputArguments};
+use crate::output_arguments::{CloudArguments, Convert};
 use crate::progress::Messages;
-use clap::{Args, Parser, Subcommand, ValueEnum};
-use skep::{DepthRange, Options, Result};
+use crate::run_arguments::Run;
+use clap::{Args, Parser, Subcommand};
+use skep::{Options, Result};
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -43,111 +44,6 @@ pub enum Command {
     Evaluate(Box<crate::evaluate::Evaluate>),
     /// Show version, instruction set, threads and every option of the presets, or explain one option
     Info(Info),
-}
-
-#[derive(Args)]
-pub struct Run {
-    /// Folder with images/ and a COLMAP model in sparse/ or sparse/0/, of any camera model; or a scene of
-    /// another program (`skep help reconstruct` lists them)
-    pub scene: PathBuf,
-    /// Folder of the results [default: SCENE/dense]
-    #[arg(short, long, value_name = "DIR")]
-    output: Option<PathBuf>,
-    /// Set of option values to start from: default has the best quality; fast takes less than half of its
-    /// time; paper follows the paper literally and is slow
-    #[arg(long, default_value = "default", value_parser = Options::PRESETS)]
-    pub preset: String,
-    /// Worker threads at most; 0 uses one for each core. At most four for each core are started, and no more
-    /// than the images keep busy. The result does not depend on it
-    #[arg(short, long, value_name = "N", default_value_t = 0)]
-    threads: usize,
-    /// Seed of the random generator; the same seed gives the same result
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    seed: u64,
-    /// Depth range to search in every view, in units of the model, instead of that of the sparse points
-    #[arg(long, num_args = 2, value_names = ["MIN", "MAX"], allow_negative_numbers = true)]
-    depth_range: Option<Vec<f64>>,
-    #[command(flatten)]
-    input: Input,
-    /// Parts of the method to leave out, separated by commas
-    #[arg(long, value_name = "PARTS", value_delimiter = ',')]
-    without: Vec<Part>,
-    /// Set an option of the preset; `skep info` lists names and values, `skep info NAME` explains one. May be
-    /// repeated
-    #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
-    set: Vec<(String, String)>,
-    /// Leave pixels of a smaller confidence, 0 to 1, out of the cloud
-    #[arg(long, value_name = "C")]
-    min_confidence: Option<f64>,
-    /// Scales to search instead of the preset's, from coarse to fine, the last at full size, such as
-    /// 'downscale=2 food_sources=3 iterations=5+4x1; downscale=1 food_sources=2 iterations=1+2x1': half size
-    /// with 3 food sources a pixel, 5 iterations in the first cycle and 4 more cycles of 1, then full size
-    #[arg(long, value_name = "SCALES")]
-    schedule: Option<String>,
-    /// Memory to keep to, such as 8GiB; the result does not depend on it [default: three quarters of what
-    /// the machine or its control group allows]
-    #[arg(long, value_name = "SIZE", value_parser = bytes)]
-    memory: Option<u64>,
-    #[command(flatten)]
-    pub files: OutputArguments,
-    /// Begin anew where a run in the folder would go on
-    #[arg(long)]
-    pub fresh: bool,
-    #[command(flatten)]
-    pub messages: Messages,
-}
-
-/// The numbers of a box.
-const CORNERS: [&str; 6] = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"];
-
-/// What is taken from the scene.
-#[derive(Args)]
-pub struct Input {
-    /// Reduce photographs whose longer side has more pixels; the maps have the reduced size
-    #[arg(long, value_name = "PIXELS")]
-    max_image_size: Option<u32>,
-    /// Photographs to take: names or patterns with * and ?, separated by commas, or a file with one on each
-    /// line
-    #[arg(long, value_name = "NAMES|FILE")]
-    images: Option<String>,
-    /// Photographs that get maps, in the same form; of the others only the source views of these are taken
-    #[arg(long, value_name = "NAMES|FILE")]
-    reference: Option<String>,
-    /// Folder of masks, NAME.png for the photograph NAME: where a mask is 0, nothing is estimated
-    #[arg(long, value_name = "DIR")]
-    masks: Option<String>,
-    /// Ignore pixels of alpha 0 like masked ones
-    #[arg(long)]
-    alpha_mask: bool,
-    /// File with the source views of each view, in the layout of COLMAP's patch-match.cfg
-    #[arg(long, value_name = "FILE")]
-    sources: Option<String>,
-    /// File with depth ranges of views, lines NAME NEAR FAR; other views have that of the sparse points
-    #[arg(long, value_name = "FILE")]
-    depth_ranges: Option<String>,
-    /// Box of the world in which surfaces are reconstructed
-    #[arg(long, num_args = 6, value_names = CORNERS, allow_negative_numbers = true)]
-    bounds: Option<Vec<f64>>,
-}
-
-impl Input {
-    fn set(&self, options: &mut Options) -> Result<()> {
-        let bounds = self
-            .bounds
-            .as_ref()
-            .map(|numbers| numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" "));
-        let texts = [
-            ("input.max_image_size", self.max_image_size.map(|size| size.to_string())),
-            ("input.images", self.images.clone()),
-            ("input.reference", self.reference.clone()),
-            ("input.masks", self.masks.clone()),
-            ("input.alpha_mask", self.alpha_mask.then(|| true.to_string())),
-            ("input.sources", self.sources.clone()),
-            ("input.depth_ranges", self.depth_ranges.clone()),
-            ("input.bounds", bounds),
-        ];
-        texts.iter().try_for_each(|(name, text)| text.iter().try_for_each(|text| options.set(name, text)))
-    }
 }
 
 #[derive(Args)]
@@ -231,7 +127,7 @@ impl Resources {
 }
 
 /// A size in bytes.
-fn bytes(text: &str) -> std::result::Result<u64, String> {
+pub fn bytes(text: &str) -> std::result::Result<u64, String> {
     skep::parse_bytes(text).map_err(|error| error.to_string())
 }
 
@@ -247,20 +143,9 @@ fn range(text: &str) -> std::result::Result<Range<usize>, String> {
 }
 
 /// `NAME=VALUE`.
-fn setting(text: &str) -> std::result::Result<(String, String), String> {
+pub fn setting(text: &str) -> std::result::Result<(String, String), String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE, such as smoothness_reward=0.1")?;
     Ok((name.trim().to_owned(), value.trim().to_owned()))
-}
-
-/// A part of the method that can be left out.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Part {
-    /// Refinement of the view set of each pixel by incident angle and visibility
-    ViewSelection,
-    /// Reward of planes that come from validated neighbors
-    Reward,
-    /// Propagation of consistent planes to other views
-    Propagation,
 }
 
 #[derive(Args)]
@@ -310,48 +195,6 @@ pub struct Fuse {
     pub resources: Resources,
     #[command(flatten)]
     pub messages: Messages,
-}
-
-impl Run {
-    /// The folder of the results.
-    pub fn output(&self) -> PathBuf {
-        self.output.clone().unwrap_or_else(|| self.scene.join("dense"))
-    }
-
-    /// The preset, as changed by the other arguments.
-    pub fn options(&self) -> Result<Options> {
-        let mut options = Options::preset(&self.preset)?;
-        options.threads = self.threads;
-        options.seed = self.seed;
-        options.memory = self.memory.unwrap_or(0);
-        self.input.set(&mut options)?;
-        for part in &self.without {
-            match part {
-                Part::ViewSelection => options.view_selection.pixelwise_view_selection = false,
-                Part::Reward => options.search.smoothness_reward = 0.0,
-                Part::Propagation => options.search.view_propagation = false,
-            }
-        }
-        for (name, value) in &self.set {
-            options.set(name, value)?;
-        }
-        if let Some(least) = self.min_confidence {
-            options.fusion.min_confidence = least;
-        }
-        if let Some(scales) = &self.schedule {
-            options.set("schedule.scales", scales)?;
-        }
-        self.files.apply(&mut options)?;
-        Ok(options)
-    }
-
-    /// The depth range of `--depth-range`, checked.
-    pub fn depth_range(&self) -> Result<Option<DepthRange>> {
-        let Some(&[near, far]) = self.depth_range.as_deref() else { return Ok(None) };
-        let range = DepthRange { near, far };
-        range.check("--depth-range")?;
-        Ok(Some(range))
-    }
 }
 
 impl Fuse {

@@ -12,6 +12,7 @@ mod plan_files;
 mod progress;
 mod reconstruct;
 mod report;
+mod run_arguments;
 mod server;
 mod stopwatch;
 mod streams;

@@ -1,9 +1,10 @@
 //! `skep reconstruct`: maps, previews, cloud and reports of a scene folder.
 
-use crate::arguments::{Reconstruct, Run};
+use crate::arguments::Reconstruct;
 use crate::interrupt::Interrupt;
 use crate::progress::Display;
 use crate::report::{self, PAGE_NAME, PageOptions, Report, RunFiles, Totals};
+use crate::run_arguments::Run;
 use crate::stopwatch::{Stage, Stopwatch};
 use crate::{Failure, dump, streams};
 use skep::job::{Job, Needs, Summary};
