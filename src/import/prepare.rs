@@ -44,7 +44,7 @@ pub(crate) struct Extra {
 /// where it is; any other is made into one in `folder`.
 ///
 /// # Errors
-/// The errors of [`formats::read`]; a photograph or mask that is missing, damaged or not of the size of its
+/// The errors of [`chosen::read`]; a photograph or mask that is missing, damaged or not of the size of its
 /// camera; a choice that fits nothing; a file that cannot be written; [`Error::Cancelled`].
 pub(crate) fn prepare(
     scene: &Path,
