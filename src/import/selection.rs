@@ -92,7 +92,10 @@ fn keep(scene: &mut SourceScene, is_kept: &[bool]) {
     let mut place = 0..;
     scene.photographs.retain(|_| place.next().is_some_and(|place| is_kept[place]));
     for photograph in &mut scene.photographs {
+        let had_sources = photograph.sources.as_ref().is_some_and(|sources| !sources.is_empty());
         photograph.sources = photograph.sources.as_deref().map(renumbered);
+        // Whose sources are all left out takes others, as if none had been named.
+        photograph.sources.take_if(|sources| had_sources && sources.is_empty());
     }
 }
 
@@ -210,6 +213,11 @@ mod tests {
             scene.photographs.iter().map(|own| (own.name.as_str(), own.is_reference)).collect();
         assert_eq!(kept, [("a/1.jpg", false), ("b/1.jpg", true), ("b/10.jpg", false)]);
         assert_eq!(scene.photographs[1].sources, Some(vec![2, 0]));
+        assert_eq!(scene.photographs[0].sources, Some(vec![2]), "of its sources one is left out");
+        let mut without = self::scene();
+        without.photographs[3].sources = Some(vec![0]);
+        select(&mut without, "b*").unwrap();
+        assert_eq!(without.photographs[1].sources, None, "its only source is left out");
         options.set("input.reference", "c*").unwrap();
         let error = select_references(&mut scene, &options).unwrap_err().to_string();
         assert!(error.contains("options.input.reference is `c*`"), "{error}");
