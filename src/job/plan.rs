@@ -101,7 +101,11 @@ pub(super) fn read_planned(folder: &RunFolder, manifest: &Manifest, options: &Op
     if differences.is_empty() {
         return scene(&own, model, manifest);
     }
-    let problem = format!("not what the run was planned with: {}; plan it again", differences.join(", "));
+    let problem = format!(
+        "not what the run was planned with: {}; `skep reconstruct` or `skep plan` \
+                          begins anew, and `skep fuse DIR --output FILE` fuses the maps as they are",
+        differences.join(", ")
+    );
     Err(Error::file(folder.manifest(), problem))
 }
 

@@ -56,6 +56,9 @@ pub fn run(arguments: &Fuse, interrupt: &Interrupt) -> Result<(), Failure> {
 /// Does the last task of a run.
 fn task(arguments: &Fuse, display: Display, interrupt: &Interrupt) -> Result<(), Failure> {
     let job = Job::open(&arguments.workspace, &arguments.resources.options())?;
+    if job.is_complete() {
+        display.print("the cloud of this run is complete; --output FILE makes another one");
+    }
     tasks::run(&job, &[Task::Fuse], display, interrupt)?;
     let conclusion = Conclusion {
         stopwatch: None,
@@ -115,6 +118,10 @@ fn listed(names: &[&str]) -> String {
 
 /// Why a cloud is empty or thin, and the options that would help; nothing for other clouds.
 fn few_points(fused: &FusedWorkspace, options: &Options) -> Option<String> {
+    let is_thinned = options.fusion.voxel_size > 0.0 || options.fusion.max_points > 0;
+    if is_thinned && fused.points > 0 {
+        return None;
+    }
     let cloud = reconstruct::few_points(fused.points, fused.pixels)?;
     let FusedWorkspace { pixels, depths, .. } = *fused;
     let share = depths as f64 * 100.0 / pixels.max(1) as f64;
@@ -152,6 +159,9 @@ mod tests {
         let empty = few_points(&FusedWorkspace { points: 0, depths: 0, ..FUSED }, &options).unwrap();
         assert_eq!(empty, "the cloud is empty: 0 of 1000 pixels (0.0 %) have a depth in the maps");
         assert_eq!(few_points(&FusedWorkspace { points: 10, ..FUSED }, &options), None);
+        let mut thinned = options.clone();
+        thinned.fusion.max_points = 3;
+        assert_eq!(few_points(&FUSED, &thinned), None, "as few as were asked for");
         let mut strict = options.clone();
         strict.fusion.min_confidence = 0.5;
         assert!(few_points(&FUSED, &strict).unwrap().contains("fusion.min_confidence below 0.5"));

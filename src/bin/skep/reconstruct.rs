@@ -175,7 +175,7 @@ fn needs(job: &Job) -> String {
         _ => format!("{:.1} h", seconds / 3600.0),
     };
     format!(
-        "{} views; about {time} on {threads} threads, up to {} of memory (at least {}) and {} on disk",
+        "{} views; about {time} on {threads} threads, at most {} of memory (it works with {}) and {} on disk",
         job.scene().views().len(),
         format_bytes(memory),
         format_bytes(least_memory),

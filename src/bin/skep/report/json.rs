@@ -121,12 +121,13 @@ impl Report {
     }
 }
 
-/// The preset with these options, apart from those that do not change the result.
+/// The preset with these options, apart from what is taken from the scene and what does not change the result.
 fn preset_of(options: &Options) -> Option<&'static str> {
     Options::PRESETS.into_iter().find(|name| {
         let Options { threads, memory, simd, output, .. } = *options;
+        let input = options.input.clone();
         Options::preset(name)
-            .is_ok_and(|preset| Options { threads, memory, simd, output, ..preset } == *options)
+            .is_ok_and(|preset| Options { threads, memory, simd, output, input, ..preset } == *options)
     })
 }
 
