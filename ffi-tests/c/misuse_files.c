@@ -209,7 +209,7 @@ static void check_scene_folder(const char *folder, const skep_scene *handed_in) 
         remove(file);
         if (i != 2) {
             FAILS(skep_scene_read(place, NULL, 1, 9, OUT(skep_scene *, 0)), SKEP_ERR_FILE,
-                  i == 3 ? "view0001.png" : "no COLMAP model");
+                  i == 3 ? "view0001.png" : "a COLMAP model");
         } else {
             FAILS(skep_scene_read(place, NULL, 0, 0, OUT(skep_scene *, 0)), SKEP_ERR_ARGUMENT,
                   "depth range");
