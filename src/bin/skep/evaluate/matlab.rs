@@ -20,8 +20,8 @@ const ARRAY: u32 = 14;
 const COMPRESSED: u32 = 15;
 /// Classes of arrays that hold numbers: double to the unsigned integers of 64 bits.
 const NUMBERS: std::ops::RangeInclusive<u8> = 6..=15;
-/// Bytes of an array at most; a mask of DTU has some hundred million.
-const MOST_BYTES: u64 = 1 << 32;
+/// Bytes of an array at most, of which each becomes a number of eight in memory.
+const MOST_BYTES: u64 = 1 << 28;
 
 /// An array of numbers.
 #[derive(Debug, PartialEq)]
@@ -56,6 +56,9 @@ pub fn read(path: &Path) -> Result<Vec<Array>> {
                 let mut inflated = Vec::new();
                 let read = ZlibDecoder::new(data).take(MOST_BYTES).read_to_end(&mut inflated);
                 read.map_err(|error| damaged(&format!("an array cannot be decompressed: {error}")))?;
+                if inflated.len() as u64 == MOST_BYTES {
+                    return Err(damaged(&format!("an array has {MOST_BYTES} bytes or more")));
+                }
                 match element(&mut inflated.as_slice()) {
                     Some((ARRAY, data)) => array(data),
                     _ => Err("a compressed array is truncated".to_owned()),

@@ -7,6 +7,9 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
+/// Points of a LAS file that are read at a time.
+const LAS_PART: u64 = 1 << 16;
+
 /// Points and, where the file has them, their colors.
 #[derive(Debug, Default)]
 pub struct Points {
@@ -124,12 +127,19 @@ fn read_ply(path: &Path) -> Result<Points> {
 fn read_las(path: &Path) -> Result<Points> {
     let failed = |error: las::Error| Error::file(path, format!("cannot be read: {error}"));
     let mut reader = las::Reader::from_path(path).map_err(failed)?;
-    let points = reader.read_all().map_err(failed)?;
-    let positions: Vec<[f64; 3]> =
-        points.x().zip(points.y()).zip(points.z()).map(|((x, y), z)| [x, y, z]).collect();
-    // 16 bits become 8.
-    let colors = points.rgb().map(|colors| {
-        colors.map(|(red, green, blue)| [red, green, blue].map(|channel| (channel >> 8) as u8)).collect()
-    });
-    Ok(Points { positions, colors, dropped: 0 })
+    let (mut positions, mut colors) = (Vec::new(), Some(Vec::new()));
+    // In parts: the number of points in a damaged header may be any.
+    loop {
+        let points = reader.read_points(LAS_PART).map_err(failed)?;
+        if points.is_empty() {
+            return Ok(Points { positions, colors, dropped: 0 });
+        }
+        positions.extend(points.x().zip(points.y()).zip(points.z()).map(|((x, y), z)| [x, y, z]));
+        // 16 bits become 8.
+        let of_color = |(red, green, blue): (u16, u16, u16)| [red, green, blue].map(|own| (own >> 8) as u8);
+        match (&mut colors, points.rgb()) {
+            (Some(colors), Some(more)) => colors.extend(more.map(of_color)),
+            _ => colors = None,
+        }
+    }
 }

@@ -43,7 +43,9 @@ fn by_radius(points: &[[f64; 3]], radius: f64) -> Vec<[f64; 3]> {
     for (_, index) in order {
         let (point, [x, y, z]) = (glam::DVec3::from(points[index]), cell(&points[index], radius));
         let mut around = (0..27).filter_map(|place: i64| {
-            taken.get(&[x + place % 3 - 1, y + place / 3 % 3 - 1, z + place / 9 - 1])
+            // Cells saturate at the ends of their numbers.
+            let beside = |cell: i64, step: i64| cell.saturating_add(step % 3 - 1);
+            taken.get(&[beside(x, place), beside(y, place / 3), beside(z, place / 9)])
         });
         let is_near = around.any(|others: &Vec<u32>| {
             others.iter().any(|&other| {
