@@ -100,7 +100,7 @@ fn capitalized(text: &str) -> String {
 
 /// Views of which few pixels are validated, or whose poses do not fit.
 fn of_views(files: &RunFiles) -> Vec<Advice> {
-    let views = 0..files.model.images.len();
+    let views = (0..files.model.images.len()).filter(|&view| files.is_reference(view));
     let share = |view: usize| {
         let report = files.view_report(view)?;
         let counts = &report["status_counts"];
@@ -134,7 +134,7 @@ fn of_views(files: &RunFiles) -> Vec<Advice> {
 
 /// Views in bad places.
 fn of_geometry(files: &RunFiles, geometry: &Geometry) -> Vec<Advice> {
-    let views = 0..files.model.images.len();
+    let views = (0..files.model.images.len()).filter(|&view| files.is_reference(view));
     let median = |view: usize| {
         let angles = geometry.sorted_angles(view);
         angles.get(angles.len() / 2).copied()

@@ -37,7 +37,9 @@ impl Cloud {
     /// # Errors
     /// A file that cannot be read.
     pub fn read(path: &Path, most: usize) -> io::Result<Cloud> {
-        let found = cloud_files::sample(path, most)?;
+        let mut found = cloud_files::sample(path, most)?;
+        // Clouds of other programs may have such points, which would leave no box for the others.
+        found.points.retain(|point| DVec3::from(point.position).is_finite());
         let confidences = found.points.iter().map(|_| Default::default()).collect();
         Ok(Cloud {
             points: found.points,

@@ -71,8 +71,12 @@ fn mixed(index: u64) -> u64 {
 fn sample_ply(path: &Path, most: usize) -> io::Result<Found> {
     let mut file = BufReader::new(File::open(path)?);
     let (count, is_double) = read_header(&mut file)?;
+    let bytes: usize = if is_double { 3 * 8 } else { 3 * 4 } + 3 * 4 + 3;
+    let length = file.get_ref().metadata()?.len();
+    if count.checked_mul(bytes as u64).is_none_or(|needed| needed > length) {
+        return Err(io::Error::other("truncated: fewer points than the header says"));
+    }
     let places = places(count, most);
-    let bytes = if is_double { 3 * 8 } else { 3 * 4 } + 3 * 4 + 3;
     let mut record = vec![0; bytes];
     let mut points = Vec::with_capacity(places.len());
     let mut next = 0;
@@ -237,5 +241,13 @@ mod tests {
         }
         std::fs::write(folder.path().join("other.ply"), "ply\nend_header\n").unwrap();
         assert!(sample(&folder.path().join("other.ply"), 10).is_err());
+        let ply = std::fs::read(folder.path().join("cloud.ply")).unwrap();
+        let header = String::from_utf8_lossy(&ply[..300]).into_owned();
+        for count in ["101", "18446744073709551615"] {
+            let text = header.replacen("element vertex 100", &format!("element vertex {count}"), 1);
+            let damaged = [text.split("end_header\n").next().unwrap().as_bytes(), b"end_header\n"].concat();
+            std::fs::write(folder.path().join("other.ply"), damaged).unwrap();
+            assert!(sample(&folder.path().join("other.ply"), 10).is_err(), "{count} points");
+        }
     }
 }

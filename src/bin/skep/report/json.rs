@@ -121,7 +121,8 @@ impl Report {
     }
 }
 
-/// The preset with these options, apart from what is taken from the scene and what does not change the result.
+/// The preset with these options, apart from what is taken from the scene and what does not change the
+/// result.
 fn preset_of(options: &Options) -> Option<&'static str> {
     Options::PRESETS.into_iter().find(|name| {
         let Options { threads, memory, simd, output, .. } = *options;

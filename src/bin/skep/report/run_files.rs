@@ -31,7 +31,8 @@ impl RunFiles {
         let file = folder.join("report.json");
         let (report, is_complete) = match std::fs::read(&file) {
             Ok(bytes) => {
-                let read = serde_json::from_slice(&bytes);
+                // An object: what reads it takes missing keys for null, but not other kinds of values.
+                let read = serde_json::from_slice(&bytes).map(Value::Object);
                 (read.map_err(|error| Error::file(&file, format!("not a report: {error}")))?, Some(true))
             }
             Err(_) => match skep::job::read_state(folder)? {
@@ -67,6 +68,11 @@ impl RunFiles {
         // The order of both files is the same, but for a report of another model.
         let views = self.report["views"].as_array()?;
         views.get(view).filter(is_it).or_else(|| views.iter().find(is_it))
+    }
+
+    /// Whether a view was to get maps; else only its photograph was used.
+    pub fn is_reference(&self, view: usize) -> bool {
+        self.view_report(view).is_none_or(|report| report["reference"] != false)
     }
 
     /// The clouds that may be there, the fused one of the run's format first.
