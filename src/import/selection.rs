@@ -130,9 +130,7 @@ impl PictureSource for NoPixels {
 fn entries(chosen: &str) -> Result<Vec<String>> {
     let path = Path::new(chosen.trim());
     let list = match path.is_file() {
-        true => {
-            std::fs::read_to_string(path).map_err(|error| cannot_be_read(path, error))?.replace(',', "\n")
-        }
+        true => std::fs::read_to_string(path).map_err(|error| cannot_be_read(path, error))?,
         false => chosen.replace(',', "\n"),
     };
     let lines = list.lines().map(str::trim);
