@@ -9,6 +9,7 @@ use crate::io::{
     cannot_be_read, deep_picture_from_bytes, largest_value, opaque_pixels, picture_from_bytes,
     picture_header, read_mask,
 };
+use crate::memory::require_memory;
 use crate::options::InputOptions;
 use rayon::prelude::*;
 use std::path::Path;
@@ -53,9 +54,25 @@ impl<'a> Changes<'a> {
         let white = self.white;
         (white != u16::MAX).then(|| {
             format!(
-                "the photographs have 16 bits a channel, but no value above {white}: {white} is taken as white"
+                "the photographs have 16 bits a channel, but no value above {white}: {white} is taken as \
+                 white"
             )
         })
+    }
+
+    /// The results of some work on every photograph, in their order, as many at a time as fit into a memory
+    /// while they are changed.
+    ///
+    /// # Errors
+    /// Less memory than the change of one takes.
+    pub(super) fn each<T: Send>(&self, memory: u64, work: &(dyn Fn(usize) -> T + Sync)) -> Result<Vec<T>> {
+        let largest = self.changes.iter().map(Change::memory).max().unwrap_or(0);
+        require_memory(largest, "the change of a photograph")?;
+        let at_a_time = (memory / largest.max(1)).clamp(1, rayon::current_num_threads() as u64) as usize;
+        let views: Vec<usize> = (0..self.changes.len()).collect();
+        let in_turns = views.chunks(views.len().div_ceil(at_a_time).max(1)).collect::<Vec<_>>();
+        let one_by_one = |part: &[usize]| part.iter().map(|&view| work(view)).collect::<Vec<T>>();
+        Ok(in_turns.into_par_iter().with_max_len(1).flat_map_iter(one_by_one).collect())
     }
 
     /// Everything that the changed photograph of a view depends on besides the files, as a text.

@@ -1,7 +1,6 @@
 //! Scenes in memory, from any program.
 
 use super::changes::{Changes, read};
-use super::prepare::within_memory;
 use super::{SourcePhotograph, chosen};
 use crate::error::Result;
 use crate::geometry::DepthRange;
@@ -13,8 +12,8 @@ use rayon::prelude::*;
 use std::path::Path;
 
 /// Reads a scene of any format that [`read`](super::read()) knows into memory: photographs are undistorted,
-/// reduced and masked as [`InputOptions`](crate::InputOptions) say. `depth_range` applies to every view; it is
-/// required if nothing else says where the surfaces are. Of the options that choose photographs
+/// reduced and masked as [`InputOptions`](crate::InputOptions) say. `depth_range` applies to every view; it
+/// is required if nothing else says where the surfaces are. Of the options that choose photographs
 /// `input.reference` leaves out what is neither chosen nor a source of a chosen one; the rest are equal
 /// views. Works on a thread pool of its own.
 ///
@@ -42,7 +41,7 @@ fn read_on_pool(path: &Path, depth_range: Option<DepthRange>, options: &Options)
             sources: sources.clone(),
         })
     };
-    let views = within_memory(&changes, memory_budget(options.memory), &view)?;
+    let views = changes.each(memory_budget(options.memory), &view)?;
     let views = views.into_par_iter().collect::<Result<Vec<_>>>()?;
     let warnings = source.warnings.iter().cloned().chain(changes.warning()).collect();
     Ok(Scene::new(views, source.points.clone())?.with_warnings(warnings))

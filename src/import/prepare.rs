@@ -9,11 +9,10 @@ use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::io::{ColmapModel, ModelImage, SceneFolder, link_or_copy, write_mask, write_photograph};
 use crate::io::{Fingerprint, fingerprint, fingerprint_file};
-use crate::memory::{memory_budget, require_memory};
+use crate::memory::memory_budget;
 use crate::options::{InputOptions, Options};
 use crate::parallel::{Phase, Progress, ProgressFn};
 use crate::pipeline::Tracker;
-use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// A scene whose photographs and model a run reads as they are.
@@ -73,7 +72,7 @@ pub(crate) fn prepare(
         advance(1, view)?;
         Ok(entry)
     };
-    let entries: Vec<Result<Entry>> = within_memory(&changes, memory_budget(options.memory), &entry)?;
+    let entries: Vec<Result<Entry>> = changes.each(memory_budget(options.memory), &entry)?;
     // What is done is noted even if the rest failed: the next call does not do it again.
     let names = source.photographs.iter().map(|photograph| photograph.name.clone());
     let done = names.zip(&entries).filter_map(|(name, entry)| Some((name, entry.as_ref().ok()?.clone())));
@@ -93,24 +92,6 @@ pub(crate) fn prepare(
         extras,
         warnings,
     })
-}
-
-/// Does something with every photograph, as many at a time as fit into a memory while they are changed.
-///
-/// # Errors
-/// Less memory than the change of one takes.
-pub(super) fn within_memory<T: Send>(
-    changes: &Changes,
-    memory: u64,
-    work: &(dyn Fn(usize) -> T + Sync),
-) -> Result<Vec<T>> {
-    let largest = changes.shapes().iter().map(Change::memory).max().unwrap_or(0);
-    require_memory(largest, "the change of a photograph")?;
-    let at_a_time = (memory / largest.max(1)).clamp(1, rayon::current_num_threads() as u64) as usize;
-    let views: Vec<usize> = (0..changes.shapes().len()).collect();
-    let in_turns = views.chunks(views.len().div_ceil(at_a_time).max(1)).collect::<Vec<_>>();
-    let one_by_one = |part: &[usize]| part.iter().map(|&view| work(view)).collect::<Vec<T>>();
-    Ok(in_turns.into_par_iter().with_max_len(1).flat_map_iter(one_by_one).collect())
 }
 
 /// The file of a mask in a workspace, as COLMAP names it.
@@ -154,7 +135,8 @@ impl Import<'_> {
         match self.source.photographs.iter().find(is_own) {
             Some(photograph) => Err(Error::file(
                 &photograph.path,
-                "would be replaced by a changed photograph; name another folder than the scene's for the results",
+                "would be replaced by a changed photograph; name another folder than the scene's for the \
+                 results",
             )),
             None => Ok(()),
         }

@@ -145,18 +145,12 @@ pub(super) fn typed(value: OptionValue) -> Value {
 fn totals(job: &Job, result: &Summary) -> Totals {
     let mut counts = Counts::default();
     let mut status_counts = [0; PixelStatus::ALL.len()];
-    let mut cycles: Vec<CycleRecord> = Vec::new();
     for view in &result.views {
         counts += view.counts;
         for (total, count) in status_counts.iter_mut().zip(view.status_counts) {
             *total += count;
         }
-        for cycle in &view.cycles {
-            add_cycle(&mut cycles, cycle);
-        }
     }
-    // Coarse to fine, the order of the run.
-    cycles.sort_by_key(|cycle| (std::cmp::Reverse(cycle.downscale), cycle.cycle));
     Totals {
         pixels: job.references().iter().map(|&view| job.scene().views()[view].camera.pixels() as u64).sum(),
         status_counts: by_name(status_counts),
@@ -164,12 +158,20 @@ fn totals(job: &Job, result: &Summary) -> Totals {
         ncc_evaluations: counts.ncc_evaluations,
         bilinear_samples: counts.bilinear_samples,
         early_terminations: counts.early_terminations,
-        cycles: cycles.iter().map(CycleReport::from).collect(),
+        cycles: total_cycles(result.views.iter().flat_map(|view| &view.cycles)),
         points: result.points,
         wall_seconds: None,
         cpu_seconds: None,
         peak_resident_bytes: None,
     }
+}
+
+/// The cycles of all views together, coarse to fine, the order of the run.
+pub(super) fn total_cycles<'a>(of_views: impl Iterator<Item = &'a CycleRecord>) -> Vec<CycleReport> {
+    let mut cycles: Vec<CycleRecord> = Vec::new();
+    of_views.for_each(|cycle| add_cycle(&mut cycles, cycle));
+    cycles.sort_by_key(|cycle| (std::cmp::Reverse(cycle.downscale), cycle.cycle));
+    cycles.iter().map(CycleReport::from).collect()
 }
 
 /// Adds a view's cycle to the one of the same scale and number.
@@ -217,7 +219,7 @@ pub(super) fn by_name(counts: [u64; PixelStatus::ALL.len()]) -> BTreeMap<&'stati
 }
 
 impl CycleReport {
-    fn of_view(record: &CycleRecord) -> CycleReport {
+    pub(super) fn of_view(record: &CycleRecord) -> CycleReport {
         CycleReport { median_residual: Some(record.median_residual), ..record.into() }
     }
 }
