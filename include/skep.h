@@ -2121,8 +2121,8 @@ skep_status skep_patch_ncc(const struct skep_ncc_window *window,
  *
  * @param path             Path of the scene, a folder or a file, in the bytes of the file system.
  * @param options_or_null  Options, of which `input.*`, `threads` and `memory` count; NULL for the defaults.
- * @param near             Smallest depth of every view in world units; 0 with `far` 0 derives the ranges from
- *                         the scene.
+ * @param near             Smallest depth of every view in world units; 0 with `far` 0 derives the ranges
+ *                         from the scene.
  * @param far              Largest depth of every view in world units.
  * @param scene_out        Receives the scene; destroy it with skep_scene_destroy. skep_scene_get_warning
  *                         tells what was found out while it was read.
@@ -2364,8 +2364,8 @@ typedef struct skep_job_needs {
  * why. The options "threads", "memory" and "simd" may change. No other process can work on the run while the
  * job exists.
  *
- * @param scene            Path of the folder with images/ and a COLMAP model in sparse/ or sparse/0/, or of a
- *                         scene of another program, whose formats docs/formats.md lists.
+ * @param scene            Path of the folder with images/ and a COLMAP model in sparse/ or sparse/0/, or of
+ *                         a scene of another program, whose formats docs/formats.md lists.
  * @param near             Smallest depth of every view in world units; 0 with `far` 0 derives the ranges.
  * @param far              Largest depth of every view in world units.
  * @param options_or_null  The options, copied; NULL: the default preset.

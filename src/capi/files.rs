@@ -24,8 +24,8 @@ use std::path::Path;
 ///
 /// @param path             Path of the scene, a folder or a file, in the bytes of the file system.
 /// @param options_or_null  Options, of which `input.*`, `threads` and `memory` count; NULL for the defaults.
-/// @param near             Smallest depth of every view in world units; 0 with `far` 0 derives the ranges from
-///                         the scene.
+/// @param near             Smallest depth of every view in world units; 0 with `far` 0 derives the ranges
+///                         from the scene.
 /// @param far              Largest depth of every view in world units.
 /// @param scene_out        Receives the scene; destroy it with skep_scene_destroy. skep_scene_get_warning
 ///                         tells what was found out while it was read.

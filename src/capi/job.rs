@@ -59,8 +59,8 @@ pub struct skep_job_needs {
 /// why. The options "threads", "memory" and "simd" may change. No other process can work on the run while the
 /// job exists.
 ///
-/// @param scene            Path of the folder with images/ and a COLMAP model in sparse/ or sparse/0/, or of a
-///                         scene of another program, whose formats docs/formats.md lists.
+/// @param scene            Path of the folder with images/ and a COLMAP model in sparse/ or sparse/0/, or of
+///                         a scene of another program, whose formats docs/formats.md lists.
 /// @param near             Smallest depth of every view in world units; 0 with `far` 0 derives the ranges.
 /// @param far              Largest depth of every view in world units.
 /// @param options_or_null  The options, copied; NULL: the default preset.
