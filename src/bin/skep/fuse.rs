@@ -4,7 +4,7 @@ use crate::arguments::Fuse;
 use crate::interrupt::Interrupt;
 use crate::progress::Display;
 use crate::reconstruct::Conclusion;
-use crate::{Failure, reconstruct, streams, tasks};
+use crate::{Failure, few_points, reconstruct, streams, tasks};
 use skep::io::{SceneFolder, Workspace, WorkspaceMaps, WorkspaceView};
 use skep::job::{self, FusedWorkspace, Job, Task};
 use skep::{Error, Options, Progress};
@@ -43,7 +43,7 @@ pub fn run(arguments: &Fuse, interrupt: &Interrupt) -> Result<(), Failure> {
     })?;
     drop(reporter);
     colorless(&maps, &fused).iter().for_each(|warning| streams::warning(warning));
-    few_points(&fused, &options).iter().for_each(|warning| streams::warning(warning));
+    why_few_points(&fused, &options).iter().for_each(|warning| streams::warning(warning));
     if !arguments.messages.quiet {
         let FusedWorkspace { points, pixels, depths, .. } = fused;
         let kind = maps.kind.colmap_name();
@@ -117,12 +117,8 @@ fn listed(names: &[&str]) -> String {
 }
 
 /// Why a cloud is empty or thin, and the options that would help; nothing for other clouds.
-fn few_points(fused: &FusedWorkspace, options: &Options) -> Option<String> {
-    let is_thinned = options.fusion.voxel_size > 0.0 || options.fusion.max_points > 0;
-    if is_thinned && fused.points > 0 {
-        return None;
-    }
-    let cloud = reconstruct::few_points(fused.points, fused.pixels)?;
+fn why_few_points(fused: &FusedWorkspace, options: &Options) -> Option<String> {
+    let cloud = few_points::few_points(fused.points, fused.pixels, &options.fusion)?;
     let FusedWorkspace { pixels, depths, .. } = *fused;
     let share = depths as f64 * 100.0 / pixels.max(1) as f64;
     let mut text =
@@ -152,19 +148,16 @@ mod tests {
     #[test]
     fn an_empty_or_thin_cloud_is_explained_with_the_options_that_help() {
         let options = Options::default();
-        let thin = few_points(&FUSED, &options).unwrap();
+        let thin = why_few_points(&FUSED, &options).unwrap();
         assert!(thin.starts_with("the cloud is thin: 500 of 1000 pixels (50.0 %) have a depth"), "{thin}");
         assert!(thin.contains("--set fusion.min_agreeing_views=2"), "{thin}");
         assert!(!thin.contains("min_confidence"), "{thin}");
-        let empty = few_points(&FusedWorkspace { points: 0, depths: 0, ..FUSED }, &options).unwrap();
+        let empty = why_few_points(&FusedWorkspace { points: 0, depths: 0, ..FUSED }, &options).unwrap();
         assert_eq!(empty, "the cloud is empty: 0 of 1000 pixels (0.0 %) have a depth in the maps");
-        assert_eq!(few_points(&FusedWorkspace { points: 10, ..FUSED }, &options), None);
-        let mut thinned = options.clone();
-        thinned.fusion.max_points = 3;
-        assert_eq!(few_points(&FUSED, &thinned), None, "as few as were asked for");
+        assert_eq!(why_few_points(&FusedWorkspace { points: 10, ..FUSED }, &options), None);
         let mut strict = options.clone();
         strict.fusion.min_confidence = 0.5;
-        assert!(few_points(&FUSED, &strict).unwrap().contains("fusion.min_confidence below 0.5"));
+        assert!(why_few_points(&FUSED, &strict).unwrap().contains("fusion.min_confidence below 0.5"));
     }
 
     #[test]

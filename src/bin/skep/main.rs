@@ -4,6 +4,7 @@ mod arguments;
 mod convert;
 mod dump;
 mod evaluate;
+mod few_points;
 mod fuse;
 mod info;
 mod interrupt;

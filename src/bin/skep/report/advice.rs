@@ -2,7 +2,7 @@
 
 use super::geometry::Geometry;
 use super::run_files::RunFiles;
-use crate::reconstruct;
+use crate::few_points;
 use serde::Serialize;
 use serde_json::Value;
 use skep::PixelStatus;
@@ -80,7 +80,7 @@ fn of_statuses(totals: &Value) -> Vec<Advice> {
     };
     let advice = |status: PixelStatus| {
         let share = count(status) * 100.0 / pixels;
-        let help = reconstruct::help(status);
+        let help = few_points::help(status);
         let (meaning, remedy) = help.split_once(": ").unwrap_or((help, ""));
         Advice {
             what: format!("{share:.0} % of the pixels have no validated depth: {meaning}"),
