@@ -252,7 +252,9 @@ impl Options {
         let found: Vec<OptionInfo> = Options::infos().filter(alone).collect();
         match found[..] {
             [only] => Ok(only),
-            [] => Err(Error::argument("option", name, format!("one of {}", names(Options::infos())))),
+            [] => {
+                Err(Error::argument("option", name, format!("one of {}", names(similar(name).into_iter()))))
+            }
             _ => Err(Error::argument("option", name, format!("one of {}", names(found.into_iter())))),
         }
     }
@@ -356,6 +358,20 @@ const MAX_EXACT: u64 = 1 << 53;
 
 fn info_range(max: u64) -> Kind {
     Kind::Count { min: 0, max }
+}
+
+/// The options that share most words with a name that does not exist; all, if none shares any.
+fn similar(name: &str) -> Vec<OptionInfo> {
+    let words = |name: &str| -> Vec<String> {
+        name.split(['.', '_', '-', ' ']).filter(|word| word.len() > 2).map(str::to_lowercase).collect()
+    };
+    let wanted = words(name);
+    let shared = |info: &OptionInfo| {
+        let own = words(info.name);
+        wanted.iter().filter(|word| own.contains(word)).count()
+    };
+    let most = Options::infos().map(|info| shared(&info)).max().unwrap_or(0);
+    Options::infos().filter(|info| shared(info) == most).collect()
 }
 
 fn names(infos: impl Iterator<Item = OptionInfo>) -> String {

@@ -1,6 +1,7 @@
 //! The command line: its output, its files and its exit status.
 #![cfg(feature = "cli")]
 
+mod documents;
 mod dump;
 mod evaluate;
 mod fuse;

@@ -45,6 +45,34 @@ fn a_budget_of_memory_changes_no_bit_and_one_too_small_is_refused_with_the_least
 }
 
 #[test]
+fn the_options_in_the_report_of_a_run_make_the_same_run() {
+    let (scene, output) = finished();
+    let (output, report) = (output.to_str().unwrap(), output.join("report.json"));
+    let options = report.to_str().unwrap();
+    let again = skep(&["reconstruct", path(&scene), "--options", options, "--output", output]);
+    assert!(text(&again.stderr).contains("the run was complete before"), "{}", text(&again.stderr));
+    let (status, printed) =
+        failure(&["reconstruct", path(&scene), "--options", options, "--preset", "fast", "--output", output]);
+    assert!(status == Some(2) && printed.contains("cannot be used with"), "{printed}");
+}
+
+#[test]
+fn the_log_level_debug_prints_what_a_run_is_made_of_and_error_no_warnings() {
+    let (scene, run) = (small_board(), TempDir::new().unwrap());
+    let planned = |level: &str| {
+        let done =
+            skep(&["plan", path(&scene), "--preset", "fast", "--log-level", level, "--output", path(&run)]);
+        assert!(done.status.success(), "{}", text(&done.stderr));
+        text(&done.stderr).to_owned()
+    };
+    let printed = planned("debug");
+    assert!(printed.contains(", SIMD level ") && printed.contains("search.employed_bees="), "{printed}");
+    assert!(printed.contains("view 0, key.jpg: ") && printed.contains(", sources source"), "{printed}");
+    assert!(!planned("info").contains("SIMD level"));
+    assert_eq!(planned("warning"), "");
+}
+
+#[test]
 fn the_tasks_one_by_one_give_the_same_bits_and_may_be_repeated() {
     let (scene, output) = finished();
     let run = TempDir::new().unwrap();

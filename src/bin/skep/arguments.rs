@@ -1,16 +1,23 @@
 //! The arguments of the command line, and their help.
 
+use crate::options_file;
 use crate::output_arguments::{CloudArguments, Convert};
 use crate::progress::Messages;
 use crate::run_arguments::Run;
+use crate::streams::LogLevel;
 use clap::{Args, Parser, Subcommand};
 use skep::{Options, Result};
 use std::ops::Range;
 use std::path::PathBuf;
 
 #[derive(Parser)]
-#[command(name = "skep", version, about, after_help = EXAMPLES, arg_required_else_help = true)]
+#[command(name = "skep", version, about, after_help = include_str!("help/main.txt"))]
+#[command(arg_required_else_help = true, max_term_width = 80)]
 pub struct Arguments {
+    /// What is printed on standard error: only errors, also warnings (like --quiet), also the progress, or
+    /// also what the run is made of
+    #[arg(long, value_name = "LEVEL", global = true, default_value = "info", display_order = 100)]
+    pub log_level: LogLevel,
     #[command(subcommand)]
     pub command: Command,
 }
@@ -18,10 +25,10 @@ pub struct Arguments {
 #[derive(Subcommand)]
 pub enum Command {
     /// Estimate depth, normal and source-view maps of a scene and fuse them into a cloud
-    #[command(after_help = RECONSTRUCT_HELP)]
+    #[command(after_help = include_str!("help/reconstruct.txt"))]
     Reconstruct(Reconstruct),
     /// Plan a run in a folder, whose tasks other processes or machines then do
-    #[command(after_help = PLAN_HELP)]
+    #[command(after_help = include_str!("help/plan.txt"))]
     Plan(Plan),
     /// Task of a planned run: search views in a cycle
     Search(Views),
@@ -32,18 +39,23 @@ pub enum Command {
     /// Task of a planned run: write the maps of views, after the last cycle
     Finish(FinishViews),
     /// Fuse existing depth and normal maps, of skep or of COLMAP, into a cloud
-    #[command(after_help = FUSE_HELP)]
+    #[command(after_help = include_str!("help/fuse.txt"))]
     Fuse(Fuse),
     /// Open the report of a run, or serve it while the run goes on
-    #[command(after_help = VIEW_HELP)]
+    #[command(after_help = include_str!("help/view.txt"))]
     View(View),
     /// Write the depth, normal and confidence maps of a workspace in formats of other programs
     Convert(Convert),
     /// Score depth maps and clouds against ground truth, or against photographs that were left out
-    #[command(after_help = crate::evaluate::HELP)]
+    #[command(after_help = include_str!("help/evaluate.txt"))]
     Evaluate(Box<crate::evaluate::Evaluate>),
     /// Show version, instruction set, threads and every option of the presets, or explain one option
     Info(Info),
+    /// Print a script that completes commands and arguments in a shell
+    #[command(after_help = include_str!("help/completions.txt"))]
+    Completions(Completions),
+    /// Write the manual pages of all commands
+    Man(Man),
 }
 
 #[derive(Args)]
@@ -159,14 +171,30 @@ pub struct View {
     /// Make the page again, also if the run wrote one
     #[arg(long)]
     pub fresh: bool,
+    /// Folder with the pictures of every cycle that the run wrote with --dump, for a page that is made now
+    #[arg(long, value_name = "DIR")]
+    pub dump: Option<PathBuf>,
     #[command(flatten)]
     pub resources: Resources,
 }
 
 #[derive(Args)]
 pub struct Info {
-    /// Option to explain, with or without its group, such as check.depth_tolerance
+    /// Option to explain, with or without its group, such as check.depth_tolerance; a group, such as fusion,
+    /// or a part of a name lists those options
     pub option: Option<String>,
+}
+
+#[derive(Args)]
+pub struct Completions {
+    /// The shell
+    pub shell: clap_complete::Shell,
+}
+
+#[derive(Args)]
+pub struct Man {
+    /// Folder for the pages: skep.1, skep-reconstruct.1 and so on
+    pub folder: PathBuf,
 }
 
 #[derive(Args)]
@@ -181,8 +209,12 @@ pub struct Fuse {
     output: Option<PathBuf>,
     #[command(flatten)]
     cloud: CloudArguments,
-    /// Set an option of the fusion; `skep info` lists those of the group fusion, `skep info NAME` explains
-    /// one. May be repeated
+    /// Start from the options in FILE, a report.json of a run or an object with options, instead of the
+    /// defaults
+    #[arg(long, value_name = "FILE")]
+    options: Option<PathBuf>,
+    /// Set an option of the fusion; `skep info fusion` lists them, `skep info NAME` explains one. May be
+    /// repeated
     #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
     set: Vec<(String, String)>,
     /// Leave pixels of a smaller confidence, 0 to 1, out of the cloud; only maps of skep have confidences
@@ -200,8 +232,10 @@ pub struct Fuse {
 impl Fuse {
     /// Whether the cloud is that of a run in the folder, with the run's options.
     pub fn is_task(&self) -> bool {
-        let changes_nothing =
-            self.set.is_empty() && self.min_confidence.is_none() && self.cloud.are_default();
+        let changes_nothing = self.options.is_none()
+            && self.set.is_empty()
+            && self.min_confidence.is_none()
+            && self.cloud.are_default();
         let is_run = self.workspace.join("run").join("manifest.json").is_file();
         changes_nothing && self.scene.is_none() && self.output.is_none() && is_run
     }
@@ -209,6 +243,9 @@ impl Fuse {
     /// The options of the fusion and of its output, its threads and memory, and the file of the cloud.
     pub fn options(&self) -> Result<(Options, PathBuf)> {
         let mut options = self.resources.options();
+        if let Some(file) = &self.options {
+            options_file::apply(file, &mut options)?;
+        }
         for (name, value) in &self.set {
             options.set(name, value)?;
         }
@@ -221,113 +258,3 @@ impl Fuse {
         Ok((options, file))
     }
 }
-
-const EXAMPLES: &str = "\
-Examples:
-  skep reconstruct SCENE            maps and cloud of a scene, into SCENE/dense
-  skep fuse SCENE/dense             the cloud alone, from existing maps
-  skep view SCENE/dense             the report, in a browser
-  skep plan SCENE -o RUN            a run for other processes and machines to do
-  skep info                         the options and their values in the presets
-  skep info sigma_color             explanation of one option
-  skep help reconstruct             input and output files, and remedies of failures
-
-Lines of --progress json: phase (read, search, check, fusion), done (0 to 1), seconds_left (null at first),
-view (the one that is worked on, from 0; several may be at the same time), views (their number), cycle (from
-0) and downscale of its scale, both null except in search and check; or message. Warnings and errors are lines
-that begin with `warning: ` and `error: `.
-
-Exit status: 0 done, 1 failed, 2 wrong arguments; interrupted: 130 by Ctrl-C (SIGINT), 143 by SIGTERM,
-129 by SIGHUP. A second signal ends the program at once. Signals that are ignored when it starts, as
-`nohup` has it, stay ignored.";
-
-const RECONSTRUCT_HELP: &str = "\
-The scene:
-  images/              photographs: PNG, JPEG, TIFF, BMP, WebP, PNM; color or gray, 8 or 16 bits
-  sparse/, sparse/0/   COLMAP model, text or binary, of any camera model
-  or a scene of another program, a folder or file: transforms.json (nerfstudio, instant-ngp), .mvs
-  (OpenMVS), cams/ and pair.txt (MVSNet, ACMM), reconstruction.json (OpenSfM), *_par.txt (Middlebury)
-  Where lenses distort, or --max-image-size, --masks and the like ask for it, changed photographs,
-  masks and their model are written into the folder of the results; the maps belong to those.
-
-Results, in COLMAP's layouts:
-  fused.ply                        the cloud: position, normal, color (--cloud-format las: fused.las)
-  fused.ply.vis                    the views each point was fused from
-  preview/NAME.depth.png           previews: depth, normal and number of source views of
-          NAME.normal.png          each pixel; black where no plane was validated
-          NAME.views.png           and its confidence, white for 1
-          NAME.confidence.png
-  stereo/depth_maps/NAME.photometric.bin    the raw estimate of every pixel
-  stereo/depth_maps/NAME.geometric.bin      the validated pixels only
-  stereo/normal_maps               likewise; --write +graphs adds stereo/consistency_graphs, the view set
-                                   of each pixel: docs/formats.md
-  stereo/confidence_maps           likewise, as depth maps: the probability of each depth to be within 1 %
-  stereo/status_maps/NAME.png      the status of each pixel: validated, or the reason why it is not
-  images, sparse                   copy of the scene, for COLMAP: the folder is a workspace
-                                   of `colmap stereo_fusion --workspace_path DIR ...`
-  report.html                      the page to look at and judge the result, for any browser, offline;
-                                   `skep view DIR` opens it; --write -report leaves it out
-  report.json                      counts, times and options; written last
-  run/                             what is done of the run: the same command goes on after an
-                                   interruption (Ctrl-C, a crash, a full disk), --fresh begins anew
-
-Examples:
-  skep reconstruct SCENE --output RESULT --threads 4
-  skep reconstruct SCENE --depth-range 0.5 12
-  skep reconstruct SCENE --preset paper --without reward,propagation
-  skep reconstruct SCENE --set geom_consistency_max_error=0.03 --set fill_gaps=false
-  skep reconstruct SCENE --dump CYCLES   CYCLES/00-size2-cycle1/NAME.depth.png, .normal.png and
-                                         .validated.png (white: validated), and so on
-
-When it fails:
-  no sparse points: set --depth-range MIN MAX, or triangulate points:
-    colmap point_triangulator --database_path DATABASE --image_path IMAGES \\
-      --input_path MODEL --output_path SCENE/sparse
-  an empty or thin cloud: the last lines say why pixels were dropped, report.json for each view;
-    preview/NAME.views.png shows where too few views see the surface.
-  surfaces missing beyond some distance: they are outside the depth range; report.json has the range
-    as depth_min and depth_max, --depth-range MIN MAX sets it.";
-
-const VIEW_HELP: &str = "\
-The report is one file, RUN/report.html, without references to others: it can be sent by mail and opened on
-any machine. It shows the cloud with the cameras, each view with photograph, depth, normal, source count,
-confidence and status, the figures of the run, the geometry of the capture, and warnings with what to do.
-Where a run wrote none, or goes on, it is made from the files that are there, as far as they are there.
-
-Examples:
-  skep view SCENE/dense             opens RUN/report.html with the program of the desktop for it
-  skep view SCENE/dense --serve     http://127.0.0.1:8090/, also while the run goes on: load the page again
-                                    for what is done since
-
-A server answers this machine alone, and only requests of the page.";
-
-const PLAN_HELP: &str = "\
-A run is a set of tasks. `skep reconstruct` does all of them; a scheduler does them in this order, those of
-a line at the same time if it likes, on machines that share the folder of the run:
-
-  skep plan SCENE -o RUN
-  for each cycle N, counted from 0:
-    skep search RUN --cycle N --views A..B      all views
-    skep check RUN --cycle N --views A..B       all views, after the searches of the cycle
-    skep next RUN --cycle N                     after the checks of the cycle
-  skep finish RUN --views A..B                  all views, after the last cycle
-  skep fuse RUN                                 after all views are finished
-
-A task that is done, or of a cycle that the run skips, succeeds at once: tasks may be repeated.
-`skep plan` prints the tasks, with the views whose files each range of views reads, or writes them for a
-scheduler:
-
-  skep plan SCENE -o RUN --openjd RUN/job.json     for schedulers that read Open Job Description
-  skep plan SCENE -o RUN --slurm RUN/submit.sh     then: bash RUN/submit.sh --cpus-per-task=8 --mem=16G";
-
-const FUSE_HELP: &str = "\
-The workspace is what `skep reconstruct` or `colmap patch_match_stereo` writes: stereo/depth_maps and
-stereo/normal_maps. Its scene, images/ and sparse/, is in WORKSPACE or in the folder above it.
-The geometric (validated) maps are fused if any view has one, else the photometric (raw) ones.
-FILE.vis, the views of each point, is written beside FILE.
-In the folder of a run of skep, without other arguments, this is the run's last task, with its options.
-
-Examples:
-  skep fuse SCENE/dense
-  skep fuse SCENE/dense --output cloud.laz
-  skep fuse SCENE/dense --output small.ply --voxel 0.02 --max-points 1000000 --splat";

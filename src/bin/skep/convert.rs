@@ -42,7 +42,7 @@ pub fn run(arguments: &Convert, interrupt: &Interrupt) -> std::result::Result<()
         }
         written += 1;
     }
-    if !arguments.quiet {
+    if !streams::is_quiet(arguments.quiet) {
         let (kind, folder) = (kind.colmap_name(), arguments.output.display());
         streams::result(&format!("{kind} maps of {written} views in {folder}"));
     }

@@ -44,7 +44,7 @@ pub fn run(arguments: &Fuse, interrupt: &Interrupt) -> Result<(), Failure> {
     drop(reporter);
     colorless(&maps, &fused).iter().for_each(|warning| streams::warning(warning));
     why_few_points(&fused, &options).iter().for_each(|warning| streams::warning(warning));
-    if !arguments.messages.quiet {
+    if !arguments.messages.are_quiet() {
         let FusedWorkspace { points, pixels, depths, .. } = fused;
         let kind = maps.kind.colmap_name();
         streams::result(&format!("{depths} depths of {pixels} pixels in the {kind} maps"));
@@ -64,7 +64,7 @@ fn task(arguments: &Fuse, display: Display, interrupt: &Interrupt) -> Result<(),
         stopwatch: None,
         has_page: !arguments.no_report,
         dump: None,
-        quiet: arguments.messages.quiet,
+        quiet: arguments.messages.are_quiet(),
     };
     reconstruct::conclude(&job, &job.summary()?, conclusion, interrupt)
 }

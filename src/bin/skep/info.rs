@@ -2,13 +2,16 @@
 
 use crate::arguments::Info;
 use crate::{Failure, streams};
-use skep::Options;
 use skep::simd::SimdLevel;
+use skep::{Error, OptionInfo, Options};
 
 /// Runs the command.
 pub fn run(arguments: &Info) -> Result<(), Failure> {
     match &arguments.option {
-        Some(name) => explain(name),
+        Some(name) => match Options::info(name) {
+            Ok(info) => explain(&info),
+            Err(error) => list_matching(name, error),
+        },
         None => {
             list();
             Ok(())
@@ -30,9 +33,30 @@ fn list() {
     streams::result("\nskep info NAME explains an option; skep reconstruct --set NAME=VALUE sets it.");
 }
 
+/// The options of a group, or with a part of a name.
+fn list_matching(word: &str, error: Error) -> Result<(), Failure> {
+    let group = Options::groups().find(|(name, _)| *name == word);
+    let is_match = |info: &OptionInfo| match group {
+        Some((name, _)) => info.name.split_once('.').is_some_and(|(own, _)| own == name),
+        None => info.name.contains(word),
+    };
+    let found: Vec<OptionInfo> = Options::infos().filter(is_match).collect();
+    if found.is_empty() {
+        return Err(Failure::Usage(error));
+    }
+    if let Some((_, text)) = group {
+        streams::result(&format!("{text}\n"));
+    }
+    let width = found.iter().map(|info| info.name.len()).max().unwrap_or(0);
+    for info in found {
+        let sentence = info.explanation.split_inclusive(". ").next().unwrap_or_default().trim_end();
+        streams::result(&format!("{:<width$}  {sentence}", info.name));
+    }
+    Ok(())
+}
+
 /// What one option does, and its values in the presets.
-fn explain(name: &str) -> Result<(), Failure> {
-    let info = Options::info(name).map_err(Failure::Usage)?;
+fn explain(info: &OptionInfo) -> Result<(), Failure> {
     streams::result(&format!("{}: {}", info.name, info.explanation));
     streams::result(&format!("  unit    {}\n  values  {}", info.unit, info.kind));
     for preset in Options::PRESETS {

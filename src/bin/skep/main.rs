@@ -2,12 +2,15 @@
 
 mod arguments;
 mod convert;
+mod details;
+mod documents;
 mod dump;
 mod evaluate;
 mod few_points;
 mod fuse;
 mod info;
 mod interrupt;
+mod options_file;
 mod output_arguments;
 mod plan_files;
 mod progress;
@@ -33,7 +36,8 @@ const FAILED: u8 = 1;
 const USAGE: u8 = 2;
 
 fn main() -> ExitCode {
-    let command = Arguments::parse().command;
+    let Arguments { command, log_level } = Arguments::parse();
+    streams::set_level(log_level);
     let interrupt = Interrupt::watch();
     let result = match command {
         Command::Reconstruct(arguments) => reconstruct::run(&arguments, &interrupt),
@@ -47,6 +51,8 @@ fn main() -> ExitCode {
         Command::Convert(arguments) => convert::run(&arguments, &interrupt),
         Command::Evaluate(arguments) => evaluate::run(&arguments, &interrupt),
         Command::Info(arguments) => info::run(&arguments),
+        Command::Completions(arguments) => documents::completions(&arguments),
+        Command::Man(arguments) => documents::manual(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -58,6 +58,27 @@ impl Step {
     }
 }
 
+/// The tasks of a run.
+#[derive(Debug, Clone, Copy)]
+pub struct Tasks {
+    views: usize,
+    cycles: usize,
+    /// Whether the last task writes the page.
+    has_page: bool,
+}
+
+impl Tasks {
+    /// Those of a planned run.
+    pub fn of(job: &Job, has_page: bool) -> Tasks {
+        Tasks { views: job.stepper().views(), cycles: job.stepper().cycles().len(), has_page }
+    }
+
+    /// Arguments of a step besides the folder, the cycle and the views.
+    fn more_arguments(self, step: Step) -> &'static [&'static str] {
+        if step == Step::Fuse && !self.has_page { &["--no-report"] } else { &[] }
+    }
+}
+
 /// Views of a task.
 fn views_per_task(views: usize) -> usize {
     VIEWS_PER_TASK.max(views.div_ceil(MOST_TASKS))
@@ -74,8 +95,8 @@ fn text(range: &Range<usize>) -> String {
 }
 
 /// The commands of all tasks, with what each range of views reads.
-pub fn command_lines(job: &Job, folder: &str) -> Vec<String> {
-    let views = job.stepper().views();
+pub fn command_lines(job: &Job, tasks: &Tasks, folder: &str) -> Vec<String> {
+    let views = tasks.views;
     let mut lines = vec!["# views read, besides their own, by the tasks of a range of views".to_owned()];
     for range in ranges(views) {
         let mut read: Vec<usize> = range.clone().flat_map(|view| job.views_read_by(view)).collect();
@@ -85,14 +106,15 @@ pub fn command_lines(job: &Job, folder: &str) -> Vec<String> {
         let read: Vec<String> = read.iter().map(usize::to_string).collect();
         lines.push(format!("# {}: {}", text(&range), read.join(" ")));
     }
-    for step in Step::all(job.stepper().cycles().len()) {
+    for step in Step::all(tasks.cycles) {
         let (command, cycle) = step.command();
         let cycle = cycle.map(|cycle| format!(" --cycle {cycle}")).unwrap_or_default();
         if step.is_of_views() {
             let line = |range| format!("skep {command} {folder}{cycle} --views {}", text(&range));
             lines.extend(ranges(views).map(line));
         } else {
-            lines.push(format!("skep {command} {folder}{cycle}"));
+            let more: String = tasks.more_arguments(step).iter().map(|word| format!(" {word}")).collect();
+            lines.push(format!("skep {command} {folder}{cycle}{more}"));
         }
     }
     lines
@@ -102,9 +124,8 @@ pub fn command_lines(job: &Job, folder: &str) -> Vec<String> {
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write_openjd(job: &Job, folder: &Path, file: &Path) -> Result<()> {
-    let (views, cycles) = (job.stepper().views(), job.stepper().cycles().len());
-    let template = openjd_template(views, cycles, default_folder(folder, file).as_deref());
+pub fn write_openjd(tasks: &Tasks, folder: &Path, file: &Path) -> Result<()> {
+    let template = openjd_template(tasks, default_folder(folder, file).as_deref());
     write_file(file, |out| {
         serde_json::to_writer_pretty(&mut *out, &template)?;
         out.write_all(b"\n")
@@ -122,7 +143,7 @@ fn default_folder(folder: &Path, file: &Path) -> Option<String> {
     Some(if relative.is_empty() { ".".to_owned() } else { relative })
 }
 
-fn openjd_template(views: usize, cycles: usize, default_folder: Option<&str>) -> Value {
+fn openjd_template(tasks: &Tasks, default_folder: Option<&str>) -> Value {
     let mut folder = json!({
         "name": "Run", "type": "PATH", "objectType": "DIRECTORY", "dataFlow": "INOUT",
         "description": "Folder of the run, as planned by `skep plan`",
@@ -130,10 +151,10 @@ fn openjd_template(views: usize, cycles: usize, default_folder: Option<&str>) ->
     if let Some(default) = default_folder {
         folder["default"] = default.into();
     }
-    let steps = Step::all(cycles);
+    let steps = Step::all(tasks.cycles);
     let before = std::iter::once(None).chain(steps.iter().copied().map(Some));
     let steps: Vec<Value> =
-        steps.iter().zip(before).map(|(&step, before)| openjd_step(step, before, views)).collect();
+        steps.iter().zip(before).map(|(&step, before)| openjd_step(tasks, step, before)).collect();
     json!({
         "specificationVersion": "jobtemplate-2023-09",
         "name": "skep",
@@ -152,7 +173,7 @@ fn openjd_template(views: usize, cycles: usize, default_folder: Option<&str>) ->
     })
 }
 
-fn openjd_step(step: Step, before: Option<Step>, views: usize) -> Value {
+fn openjd_step(tasks: &Tasks, step: Step, before: Option<Step>) -> Value {
     let (command, cycle) = step.command();
     let mut arguments = vec![command.to_owned(), "{{Param.Run}}".to_owned(), "--quiet".to_owned()];
     if let Some(cycle) = cycle {
@@ -162,10 +183,11 @@ fn openjd_step(step: Step, before: Option<Step>, views: usize) -> Value {
         arguments
             .extend(["--views", "{{Task.Param.Views}}", "--threads", "{{Param.Threads}}"].map(String::from));
     }
+    arguments.extend(tasks.more_arguments(step).iter().map(|&word| word.to_owned()));
     let action = json!({ "onRun": { "command": "{{Param.Skep}}", "args": arguments } });
     let mut template = json!({ "name": step.name(), "script": { "actions": action } });
     if step.is_of_views() {
-        let range: Vec<String> = ranges(views).map(|range| text(&range)).collect();
+        let range: Vec<String> = ranges(tasks.views).map(|range| text(&range)).collect();
         let parameter = json!({ "name": "Views", "type": "STRING", "range": range });
         template["parameterSpace"] = json!({ "taskParameterDefinitions": [parameter] });
     }
@@ -179,26 +201,30 @@ fn openjd_step(step: Step, before: Option<Step>, views: usize) -> Value {
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write_slurm(job: &Job, folder: &Path, file: &Path) -> Result<()> {
-    let (views, cycles) = (job.stepper().views(), job.stepper().cycles().len());
+pub fn write_slurm(tasks: &Tasks, folder: &Path, file: &Path) -> Result<()> {
     // Tasks start in other folders than the script is submitted from.
     let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
-    let script = slurm_script(views, cycles, &folder.to_string_lossy());
+    let script = slurm_script(tasks, &folder.to_string_lossy());
     write_file(file, |out| out.write_all(script.as_bytes()))
 }
 
-fn slurm_script(views: usize, cycles: usize, folder: &str) -> String {
+fn slurm_script(tasks: &Tasks, folder: &str) -> String {
+    let Tasks { views, cycles, .. } = *tasks;
+    let last = tasks.more_arguments(Step::Fuse).join(" ");
     // The folder last: it may contain anything.
     SLURM_SCRIPT
         .replace("@VIEWS@", &views.to_string())
         .replace("@VIEWS_PER_TASK@", &views_per_task(views).to_string())
         .replace("@CYCLES@", &cycles.to_string())
+        .replace("@FUSE@", &last)
         .replace("@RUN@", &format!("'{}'", folder.replace('\'', r"'\''")))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const TASKS: Tasks = Tasks { views: 20, cycles: 2, has_page: true };
 
     #[test]
     fn ranges_cover_all_views_and_are_no_more_than_schedulers_take() {
@@ -212,7 +238,7 @@ mod tests {
 
     #[test]
     fn every_step_of_a_template_depends_on_the_one_before() {
-        let template = openjd_template(20, 2, None);
+        let template = openjd_template(&TASKS, None);
         let steps = template["steps"].as_array().expect("steps");
         let names: Vec<&str> = steps.iter().map(|step| step["name"].as_str().unwrap_or_default()).collect();
         let expected = ["Search00", "Check00", "Next00", "Search01", "Check01", "Next01", "Finish", "Fuse"];
@@ -227,10 +253,20 @@ mod tests {
     }
 
     #[test]
+    fn the_last_task_of_a_run_without_a_page_makes_none() {
+        let tasks = Tasks { has_page: false, ..TASKS };
+        assert!(slurm_script(&tasks, "run").contains("\nfuse=(--no-report)\n"));
+        let steps = openjd_template(&tasks, None)["steps"].clone();
+        let last = steps.as_array().and_then(|steps| steps.last()).expect("steps");
+        let expected = json!(["fuse", "{{Param.Run}}", "--quiet", "--no-report"]);
+        assert_eq!(last["script"]["actions"]["onRun"]["args"], expected);
+    }
+
+    #[test]
     fn a_folder_with_any_name_is_quoted_in_a_script() {
-        let script = slurm_script(20, 2, "/a b/it's");
+        let script = slurm_script(&TASKS, "/a b/it's");
         assert!(
-            script.contains("\nrun='/a b/it'\\''s'\nviews=20\nviews_per_task=16\ncycles=2\n"),
+            script.contains("\nrun='/a b/it'\\''s'\nviews=20\nviews_per_task=16\ncycles=2\nfuse=()\n"),
             "{script}"
         );
         assert!(!script.contains("=@"), "{script}");

@@ -1,6 +1,6 @@
 //! Progress on standard error: a bar on a terminal, plain lines, or lines of JSON for programs.
 
-use crate::streams;
+use crate::streams::{self, LogLevel};
 use crate::time_left::{TimeLeft, clock};
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -25,6 +25,13 @@ pub struct Messages {
     /// How progress is shown on standard error [default: bar on a terminal, else plain]
     #[arg(long, value_name = "FORM")]
     pub progress: Option<ProgressForm>,
+}
+
+impl Messages {
+    /// Whether neither progress nor results are printed.
+    pub fn are_quiet(&self) -> bool {
+        streams::is_quiet(self.quiet)
+    }
 }
 
 /// A form of the progress.
@@ -66,7 +73,7 @@ impl Display {
     /// The form that was asked for, else a bar on a terminal and lines elsewhere; nothing when `quiet`.
     pub fn new(messages: &Messages) -> Display {
         let usual = || if streams::is_screen() { ProgressForm::Bar } else { ProgressForm::Plain };
-        match messages.quiet {
+        match messages.are_quiet() {
             true => Display::Silent,
             false => Display::Shown(messages.progress.unwrap_or_else(usual)),
         }
@@ -78,6 +85,13 @@ impl Display {
             Display::Silent => (),
             Display::Shown(ProgressForm::Json) => streams::notice(&json!({ "message": line }).to_string()),
             Display::Shown(ProgressForm::Bar | ProgressForm::Plain) => streams::notice(line),
+        }
+    }
+
+    /// Prints a line that helps to find out what a run does, at the log level debug.
+    pub fn detail(self, line: &str) {
+        if streams::is_shown(LogLevel::Debug) {
+            self.print(line);
         }
     }
 

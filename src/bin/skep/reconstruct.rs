@@ -1,6 +1,7 @@
 //! `skep reconstruct`: maps, previews, cloud and reports of a scene folder.
 
 use crate::arguments::Reconstruct;
+use crate::details::details;
 use crate::few_points::Outcome;
 use crate::interrupt::Interrupt;
 use crate::progress::Display;
@@ -45,7 +46,7 @@ pub fn run(arguments: &Reconstruct, interrupt: &Interrupt) -> std::result::Resul
         stopwatch: Some(stopwatch),
         has_page: run.files.has_page(),
         dump: arguments.dump.as_deref(),
-        quiet: run.messages.quiet,
+        quiet: run.messages.are_quiet(),
     };
     conclude(&job, &result, conclusion, interrupt)
 }
@@ -150,6 +151,7 @@ pub fn plan(run: &Run, display: Display, interrupt: &Interrupt) -> std::result::
     drop(reporter);
     job.notices().iter().for_each(|notice| streams::warning(notice));
     job.scene().warnings().iter().for_each(|warning| streams::warning(warning));
+    details(&job).iter().for_each(|line| display.detail(line));
     display.print(&needs(&job));
     let threads = skep::thread_count(job.scene(), &options);
     fewer_threads(options.threads, threads).iter().for_each(|line| display.print(line));

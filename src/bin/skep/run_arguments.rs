@@ -1,6 +1,7 @@
 //! The arguments of a whole run, for `skep reconstruct` and `skep plan`.
 
 use crate::arguments::{bytes, setting};
+use crate::options_file;
 use crate::output_arguments::OutputArguments;
 use crate::progress::Messages;
 use clap::{Args, ValueEnum};
@@ -19,13 +20,17 @@ pub struct Run {
     /// time; paper follows the paper literally and is slow
     #[arg(long, default_value = "default", value_parser = Options::PRESETS)]
     pub preset: String,
+    /// Start from the options in FILE instead of a preset: a report.json, for the options of its run, or an
+    /// object with options by name. Threads, memory and the instruction set are not taken
+    #[arg(long, value_name = "FILE", conflicts_with = "preset")]
+    options: Option<PathBuf>,
     /// Worker threads at most; 0 uses one for each core. At most four for each core are started, and no more
     /// than the images keep busy. The result does not depend on it
     #[arg(short, long, value_name = "N", default_value_t = 0)]
     threads: usize,
-    /// Seed of the random generator; the same seed gives the same result
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    seed: u64,
+    /// Seed of the random generator; the same seed gives the same result [default: 0]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
     /// Depth range to search in every view, in units of the model, instead of that of the sparse points
     #[arg(long, num_args = 2, value_names = ["MIN", "MAX"], allow_negative_numbers = true)]
     depth_range: Option<Vec<f64>>,
@@ -34,8 +39,7 @@ pub struct Run {
     /// Parts of the method to leave out, separated by commas
     #[arg(long, value_name = "PARTS", value_delimiter = ',')]
     without: Vec<Part>,
-    /// Set an option of the preset; `skep info` lists names and values, `skep info NAME` explains one. May be
-    /// repeated
+    /// Set an option; `skep info` lists names and values, `skep info NAME` explains one. May be repeated
     #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
     set: Vec<(String, String)>,
     /// Leave pixels of a smaller confidence, 0 to 1, out of the cloud
@@ -132,8 +136,11 @@ impl Run {
     /// The preset, as changed by the other arguments.
     pub fn options(&self) -> Result<Options> {
         let mut options = Options::preset(&self.preset)?;
+        if let Some(file) = &self.options {
+            options_file::apply(file, &mut options)?;
+        }
         options.threads = self.threads;
-        options.seed = self.seed;
+        options.seed = self.seed.unwrap_or(options.seed);
         options.memory = self.memory.unwrap_or(0);
         self.input.set(&mut options)?;
         for part in &self.without {

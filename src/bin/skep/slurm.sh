@@ -12,6 +12,7 @@ run=@RUN@
 views=@VIEWS@
 views_per_task=@VIEWS_PER_TASK@
 cycles=@CYCLES@
+fuse=(@FUSE@)
 skep=${SKEP:-skep}
 
 # task KIND [CYCLE]: does a task, for the range of views that the index in the array stands for.
@@ -26,7 +27,7 @@ task() {
     search | check) exec "$skep" "$1" "$run" --cycle "$2" --views "$start..$end" "${limits[@]}" ;;
     next) exec "$skep" next "$run" --cycle "$2" "${limits[@]}" ;;
     finish) exec "$skep" finish "$run" --views "$start..$end" "${limits[@]}" ;;
-    fuse) exec "$skep" fuse "$run" --quiet ;;
+    fuse) exec "$skep" fuse "$run" --quiet "${fuse[@]}" ;;
     *) echo "no task is called $1" >&2 && exit 2 ;;
     esac
 }

@@ -1,6 +1,39 @@
-//! Standard output and error. Failed writes are ignored: a closed pipe must not stop a run.
+//! Standard output and error, and the log level. Failed writes are ignored: a closed pipe must not stop a run.
 
+use clap::ValueEnum;
 use std::io::{IsTerminal, Write};
+use std::sync::OnceLock;
+
+/// What is printed on standard error.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+pub enum LogLevel {
+    /// Errors only
+    Error,
+    /// Also warnings
+    Warning,
+    /// Also the progress and the results
+    Info,
+    /// Also the options, and the photographs with their source views and depth ranges
+    Debug,
+}
+
+/// The level of the process; `Info` until it is set.
+static LEVEL: OnceLock<LogLevel> = OnceLock::new();
+
+/// Sets the level of the process, once.
+pub fn set_level(level: LogLevel) {
+    let _ = LEVEL.set(level);
+}
+
+/// Whether messages of this level are printed.
+pub fn is_shown(level: LogLevel) -> bool {
+    level <= *LEVEL.get().unwrap_or(&LogLevel::Info)
+}
+
+/// Whether progress and results are left out, as asked for by `--quiet` or the level.
+pub fn is_quiet(quiet: bool) -> bool {
+    quiet || !is_shown(LogLevel::Info)
+}
 
 /// Whether standard error is a terminal that erases lines when it is told to. On Windows not all are.
 pub fn is_screen() -> bool {
@@ -22,5 +55,7 @@ pub fn notice(line: &str) {
 
 /// Prints a warning; also with `--quiet`.
 pub fn warning(text: &str) {
-    notice(&format!("warning: {text}"));
+    if is_shown(LogLevel::Warning) {
+        notice(&format!("warning: {text}"));
+    }
 }

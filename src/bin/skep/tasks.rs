@@ -2,9 +2,9 @@
 
 use crate::arguments::{FinishViews, NextCycle, Plan, Planned, Views};
 use crate::interrupt::Interrupt;
+use crate::plan_files::Tasks;
 use crate::progress::Display;
-use crate::reconstruct;
-use crate::{Failure, plan_files, streams};
+use crate::{Failure, plan_files, reconstruct, streams};
 use skep::job::{Job, Task};
 use skep::{Error, Progress};
 use std::ops::Range;
@@ -14,14 +14,15 @@ pub fn plan(arguments: &Plan, interrupt: &Interrupt) -> Result<(), Failure> {
     let run = &arguments.run;
     let job = reconstruct::plan(run, Display::new(&run.messages), interrupt)?;
     let folder = run.output();
+    let tasks = Tasks::of(&job, run.files.has_page());
     if let Some(file) = &arguments.openjd {
-        plan_files::write_openjd(&job, &folder, file)?;
+        plan_files::write_openjd(&tasks, &folder, file)?;
     }
     if let Some(file) = &arguments.slurm {
-        plan_files::write_slurm(&job, &folder, file)?;
+        plan_files::write_slurm(&tasks, &folder, file)?;
     }
-    if !run.messages.quiet && arguments.openjd.is_none() && arguments.slurm.is_none() {
-        let lines = plan_files::command_lines(&job, &folder.display().to_string());
+    if !run.messages.are_quiet() && arguments.openjd.is_none() && arguments.slurm.is_none() {
+        let lines = plan_files::command_lines(&job, &tasks, &folder.display().to_string());
         lines.iter().for_each(|line| streams::result(line));
     }
     Ok(())

@@ -79,7 +79,7 @@ fn options<'a>(arguments: &View, goes_on: &'a (dyn Fn() -> bool + Sync)) -> Page
     let resources = arguments.resources.options();
     let available = || available_memory().map_or(LEAST_MEMORY, |bytes| bytes / 4 * 3);
     let memory = if resources.memory > 0 { resources.memory } else { available() };
-    PageOptions { threads: resources.threads, memory, dump: None, goes_on }
+    PageOptions { threads: resources.threads, memory, dump: arguments.dump.clone(), goes_on }
 }
 
 /// Opens a file with a program of the desktop; whether there is one.

@@ -173,32 +173,3 @@ pub enum Thinning {
     /// Points in random order, each unless one that is kept lies within SIZE
     Radius,
 }
-
-pub const HELP: &str = "\
-Depth maps against true ones: a depth is right if it differs by less than a fraction T of the true one.
-  recall      right depths in all pixels with a true depth
-  precision   right depths in all pixels with an estimate; one where the truth has no surface is wrong
-  F           their harmonic mean;  fill: pixels with true depth that have an estimate
-True maps are PNG or PGM of 8 or 16 bits, COLMAP's .bin, PFM or NPY; 0 or no number is no surface.
-  skep evaluate SCENE/dense --truth SCENE/gt
-  skep evaluate SCENE/dense --truth DEPTHS --depth-scale 0.001 --kind raw
-
-Clouds:
-  accuracy      mean distance from the cloud to the truth;  completeness: the other way;  overall: their mean
-  precision     points of the cloud nearer to the truth than D;  recall: points of the truth;  F as above
-  skep evaluate --cloud fused.ply --truth-cloud scan.ply --distances 0.01,0.02,0.05         for example ETH3D
-  skep evaluate --cloud fused.ply --truth-cloud Barn.ply --transform Barn_trans.txt \\
-    --crop Barn.json --voxel 0.005 --distances 0.01                                Tanks and Temples
-  skep evaluate --cloud fused.ply --truth-cloud stl024_total.ply --dtu-mask ObsMask24_10.mat \\
-    --dtu-plane Plane24.mat                                                        DTU
-  skep evaluate SCENE/dense --truth SCENE/gt --cloud SCENE/dense/fused.ply \\
-    --voxel 0.5 --max-distance 20 --distances 1,2                                  surface of true depth maps
-
-Photographs that were left out: the cloud is projected into each, points as discs of 1.5 pixels, the nearest
-in front. Gray values agree that differ by less than 0.06 of white, after means of 3x3 pixels and one gain
-for the view.
-  covered     pixels that carry a point;  right: pixels that carry one and agree;  precision: right / covered
-  skep evaluate SCENE --hold-out 5 --first 2 --preset fast -- --max-image-size 1000
-  skep evaluate SCENE --cloud fused.ply --views a.jpg,b.jpg
-
-docs/evaluation.md has the definitions.";

@@ -111,7 +111,7 @@ fn parse(
     if let Some(preset) = &arguments.held_out.preset {
         words.extend(["--preset".into(), preset.into()]);
     }
-    if arguments.messages.quiet {
+    if arguments.messages.are_quiet() {
         words.push("--quiet".into());
     }
     if let Some(form) = arguments.messages.progress.and_then(|form| form.to_possible_value()) {

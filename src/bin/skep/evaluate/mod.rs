@@ -23,7 +23,7 @@ mod work;
 use crate::interrupt::Interrupt;
 use crate::progress::Display;
 use crate::{Failure, streams};
-pub use arguments::{Evaluate, HELP};
+pub use arguments::Evaluate;
 use arguments::{Outliers, Thinning};
 use cloud::{CloudScores, Defaults, Settings, Sides};
 use depth::DepthScores;
@@ -60,7 +60,7 @@ pub fn run(arguments: &Evaluate, interrupt: &Interrupt) -> std::result::Result<(
     if let Some(folder) = &arguments.plots {
         pictures::draw(&scores, folder)?;
     }
-    if !arguments.messages.quiet {
+    if !arguments.messages.are_quiet() {
         lines.iter().for_each(|line| streams::result(line));
     }
     Ok(())

@@ -2,6 +2,7 @@
 
 use crate::interrupt::Interrupt;
 use crate::progress::Display;
+use crate::time_left::{TimeLeft, clock};
 use rayon::prelude::*;
 use skep::{Error, Result};
 use std::sync::Mutex;
@@ -58,16 +59,18 @@ impl<'a> Work<'a> {
         body: impl Fn(&T) -> Result<R> + Sync,
     ) -> Result<Vec<R>> {
         let done = AtomicUsize::new(0);
-        let last = Mutex::new(Instant::now());
+        let last = Mutex::new((Instant::now(), TimeLeft::start()));
         let one = |item: &T| -> Result<R> {
             self.check()?;
             let result = body(item)?;
             let done = 1 + done.fetch_add(1, Ordering::Relaxed);
             if let Ok(mut last) = last.try_lock()
-                && last.elapsed() >= INTERVAL
+                && last.0.elapsed() >= INTERVAL
             {
-                *last = Instant::now();
-                self.say(&format!("{what}: {} %", done * 100 / items.len()));
+                last.0 = Instant::now();
+                let seconds = last.1.update(done as f64 / items.len() as f64, Instant::now());
+                let left = seconds.map(|seconds| format!(", {} left", clock(seconds))).unwrap_or_default();
+                self.say(&format!("{what}: {} %{left}", done * 100 / items.len()));
             }
             Ok(result)
         };
