@@ -233,7 +233,12 @@ pub mod how_it_works {}
 #[doc = include_str!("../docs/architecture.md")]
 pub mod architecture {}
 
-/// Compiles the example of the README.
-#[cfg(doctest)]
+/// Compiles the examples of the README.
+#[cfg(all(doctest, feature = "io"))]
 #[doc = include_str!("../README.md")]
 struct Readme;
+
+/// Compiles the examples of the guide, of which those that need no files run.
+#[cfg(all(doctest, feature = "io"))]
+#[doc = include_str!("../docs/rust.md")]
+struct Guide;
