@@ -3,7 +3,8 @@
 //!
 //! It implements "Visibility-Aware Pixelwise View Selection for Multi-View Stereo Matching" (Huang et al.)
 //! with an Artificial Multi-Bee Colony search. [`how_it_works`] explains the method with its formulas,
-//! [`architecture`] the source.
+//! [`architecture`] the source. In the repository `docs/rust.md` is a guide, `docs/concepts.md` explains the
+//! terms with pictures, and `docs/options.md` lists the options; `docs/README.md` has all pages.
 //!
 #![doc = include_str!("../docs/pipeline.svg")]
 //!
