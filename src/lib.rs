@@ -3,7 +3,8 @@
 //!
 //! It implements "Visibility-Aware Pixelwise View Selection for Multi-View Stereo Matching" (Huang et al.)
 //! with an Artificial Multi-Bee Colony search. [`how_it_works`] explains the method with its formulas,
-//! [`architecture`] the source.
+//! [`architecture`] the source. In the repository `docs/rust.md` is a guide, `docs/concepts.md` explains the
+//! terms with pictures, and `docs/options.md` lists the options; `docs/README.md` has all pages.
 //!
 #![doc = include_str!("../docs/pipeline.svg")]
 //!
@@ -233,7 +234,12 @@ pub mod how_it_works {}
 #[doc = include_str!("../docs/architecture.md")]
 pub mod architecture {}
 
-/// Compiles the example of the README.
-#[cfg(doctest)]
+/// Compiles the examples of the README.
+#[cfg(all(doctest, feature = "io"))]
 #[doc = include_str!("../README.md")]
 struct Readme;
+
+/// Compiles the examples of the guide, of which those that need no files run.
+#[cfg(all(doctest, feature = "io"))]
+#[doc = include_str!("../docs/rust.md")]
+struct Guide;
