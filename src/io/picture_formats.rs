@@ -2,7 +2,7 @@
 //! how changed photographs and masks are written.
 
 use super::files::{cannot_be_read, write_file};
-use super::pictures::{decoder, is_gray, limited};
+use super::pictures::{decoder, is_gray, limited, not_decoded};
 use crate::error::{Error, Result};
 use crate::image::Picture;
 use image::codecs::jpeg::JpegEncoder;
@@ -133,5 +133,5 @@ pub(crate) fn write_photograph(path: &Path, picture: &Picture) -> Result<()> {
 fn decoded(bytes: &[u8], path: &Path) -> Result<DynamicImage> {
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
     let decoder = decoder(limited(reader.map_err(|error| cannot_be_read(path, error))?), path)?;
-    DynamicImage::from_decoder(decoder).map_err(|error| cannot_be_read(path, error))
+    DynamicImage::from_decoder(decoder).map_err(|error| not_decoded(path, &error))
 }

@@ -2,17 +2,21 @@
 
 use super::files::{cannot_be_read, write_file};
 use super::jpeg_end::has_end;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::image::Picture;
 use crate::memory::require_memory;
 use image::codecs::png::PngEncoder;
 use image::{
-    ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageFormat, ImageReader, Limits,
+    ColorType, DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, ImageFormat,
+    ImageReader, Limits,
 };
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Seek};
 use std::path::Path;
+
+/// What a file that is no photograph should be.
+const EXPECTED: &str = "expected 8 or 16 bits a channel, in PNG, JPEG, TIFF, BMP, WebP or PNM";
 
 /// Reads a PNG or JPEG file, color or gray, 8 or 16 bits (16 are rounded to 8). An alpha channel is dropped;
 /// nothing else is applied, neither an orientation nor a color profile: the calibration refers to the stored
@@ -32,7 +36,7 @@ pub(crate) fn picture_from_bytes(bytes: &[u8], path: &Path) -> Result<Picture> {
 
 fn decode<R: BufRead + Seek>(reader: ImageReader<R>, path: &Path) -> Result<Picture> {
     let decoder = decoder(reader, path)?;
-    let image = DynamicImage::from_decoder(decoder).map_err(|error| cannot_be_read(path, error))?;
+    let image = DynamicImage::from_decoder(decoder).map_err(|error| not_decoded(path, &error))?;
     let (width, height) = (image.width(), image.height());
     if is_gray(&image) {
         return Picture::from_gray(width, height, image.into_luma8().into_raw());
@@ -59,7 +63,7 @@ fn whole<R: BufRead + Seek>(reader: ImageReader<R>, path: &Path) -> Result<Image
 
 /// Width and height of a PNG or JPEG file, from its header.
 pub fn picture_size(path: &Path) -> Result<(u32, u32)> {
-    open(path)?.into_dimensions().map_err(|error| cannot_be_read(path, error))
+    open(path)?.into_dimensions().map_err(|error| not_decoded(path, &error))
 }
 
 /// Writes a picture as PNG, in color when it has colors.
@@ -83,11 +87,22 @@ pub(super) fn decoder<'a, R: BufRead + Seek + 'a>(
         decoder.set_limits(limits())?;
         Ok(decoder)
     });
-    let decoder = opened.map_err(|error| cannot_be_read(path, error))?;
+    let decoder = opened.map_err(|error| not_decoded(path, &error))?;
+    if matches!(decoder.color_type(), ColorType::Rgb32F | ColorType::Rgba32F) {
+        return Err(cannot_be_read(path, format!("its pixels are floating-point numbers; {EXPECTED}")));
+    }
     let (width, height) = decoder.dimensions();
     let bytes = decoder.total_bytes().saturating_add(4 * u64::from(width) * u64::from(height));
     require_memory(bytes, format!("the photograph {}", path.display()))?;
     Ok(Box::new(decoder))
+}
+
+/// The error of a decoder; of kinds of pixels that it does not know, with what is read.
+pub(super) fn not_decoded(path: &Path, error: &ImageError) -> Error {
+    match error {
+        ImageError::Unsupported(_) => cannot_be_read(path, format!("{error}; {EXPECTED}")),
+        _ => cannot_be_read(path, error),
+    }
 }
 
 pub(super) fn is_gray(image: &DynamicImage) -> bool {

@@ -1,7 +1,7 @@
 //! Photographs and previews.
 
 use crate::assert_refused;
-use image::{ExtendedColorType, ImageBuffer, Luma, save_buffer};
+use image::{ExtendedColorType, ImageBuffer, Luma, Rgb, save_buffer};
 use skep::io::{picture_size, read_picture, write_depth_preview, write_normal_preview, write_views_preview};
 use std::path::Path;
 use tempfile::tempdir;
@@ -54,6 +54,25 @@ fn a_truncated_jpeg_is_refused_and_trailing_bytes_are_not() {
     crate::rewrite(&path, |bytes| bytes.truncate(bytes.len() * 2 / 5));
     assert_refused(read_picture(&path), &["picture.jpg", "truncated"]);
     assert_eq!(whole.width(), 64);
+}
+
+#[test]
+fn floating_point_pixels_are_refused_with_what_is_read() {
+    let folder = tempdir().unwrap();
+    let path = folder.path().join("picture.tif");
+    let colors: ImageBuffer<Rgb<f32>, _> = ImageBuffer::from_pixel(3, 2, Rgb([0.5, 1.5, 300.0]));
+    colors.save(&path).unwrap();
+    assert_refused(
+        read_picture(&path),
+        &["picture.tif", "floating-point", "expected 8 or 16 bits a channel"],
+    );
+    #[cfg(feature = "tiff")]
+    {
+        let file = std::fs::File::create(&path).unwrap();
+        let mut encoder = tiff::encoder::TiffEncoder::new(file).unwrap();
+        encoder.write_image::<tiff::encoder::colortype::Gray32Float>(3, 2, &[0.5; 6]).unwrap();
+        assert_refused(read_picture(&path), &["picture.tif", "expected 8 or 16 bits a channel"]);
+    }
 }
 
 #[test]

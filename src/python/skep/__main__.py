@@ -1,8 +1,8 @@
 """`python -m skep` and the command `skep` of the package: the command line.
 
-Runs the program `skep` of Rust where PATH has it, with all arguments as they are. The package does not
-contain that program; without it `reconstruct` with the arguments below and `--version` work all the same.
-`mesh` is always the package's own.
+Runs the program `skep` of Rust with all arguments as they are: the one in the package, which wheels have, or
+one in PATH. A package that was built with `pip install .` does not contain it; without it `reconstruct` with
+the arguments below and `--version` work all the same. `mesh` is always the package's own.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from skep import _mesh
 
 _PROGRAM = "skep"
 _COMMANDS = tuple(
-    "reconstruct plan search check next finish fuse convert evaluate info help".split()
+    "reconstruct plan search check next finish fuse view convert evaluate info completions man help".split()
 )
 _MISSING = (
     "skep: '{}' needs the program skep, which PATH does not have; 'cargo install --path . --features cli' in "
@@ -55,8 +55,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def find_program() -> str | None:
-    """The program of Rust on PATH. The command of this package has the same name: it is a script."""
-    for folder in os.get_exec_path():
+    """The program of Rust in the package, else in PATH. The command of this package has the same name: it is a
+    script.
+    """
+    folders = [os.path.join(os.path.dirname(__file__), "_program"), *os.get_exec_path()]
+    for folder in folders:
         file = os.path.join(folder, _PROGRAM)
         if os.path.isfile(file) and os.access(file, os.X_OK):
             with open(file, "rb") as opened:

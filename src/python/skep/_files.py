@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import Any, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +12,7 @@ from ._buffers import indices, path, pointer, rows
 from ._errors import ArgumentError, check
 from ._native import ffi, lib
 
-Path = str | os.PathLike[str]
+Path = Union[str, "os.PathLike[str]"]
 
 
 def _write(function: Any, file: Path, values: ArrayLike, channels: tuple[int, ...], name: str) -> None:

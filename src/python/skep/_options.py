@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Literal
+from typing import Any, Literal, Union
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from ._buffers import take_text, text
 from ._errors import check
 from ._native import ffi, lib
 
-Value = int | float | bool | str
+Value = Union[int, float, bool, str]
 """The value of an option."""
 
 
@@ -288,7 +288,7 @@ class Options(Mapping[str, Value]):
 
     def __setitem__(self, name: str, value: Value) -> None:
         full = text(_BY_ANY_NAME.get(name, name), "name")
-        if isinstance(value, bool | np.bool_):
+        if isinstance(value, (bool, np.bool_)):
             value = str(value).lower()
         # A text represents every whole number, and the shortest text of a float is read back exactly.
         check(lib.skep_options_set_text(self._handle, full, text(str(value), name)))
