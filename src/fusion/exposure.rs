@@ -32,19 +32,21 @@ struct Pair {
     ratio: DVec3,
 }
 
-/// Factors of red, green and blue for each view; calls `before` before each reference view.
+/// Factors of red, green and blue for each view; calls `before` with the place in the order before each
+/// reference view.
 ///
 /// # Errors
 /// Views that cannot be read; what `before` returns.
 pub(super) fn gains(
     input: &dyn FusionInput,
     options: &FusionOptions,
-    before: impl Fn(usize) -> Result<()>,
+    order: &[usize],
+    before: impl Fn(usize) -> Result<()> + Sync,
 ) -> Result<Vec<DVec3>> {
     let mut pairs = Vec::new();
-    for index in 0..input.len() {
-        before(index)?;
-        with_group(input, index, &mut |group| {
+    for (place, &index) in order.iter().enumerate() {
+        before(place)?;
+        with_group(input, index, &|| before(place), &mut |group| {
             let reference = Reference::new(group, index, input.overlap(index), options);
             pairs.par_extend(reference.sources.par_iter().filter_map(|source| pair(&reference, source)));
             Ok(())

@@ -110,6 +110,11 @@ pub fn fuse(views: &[FusionView], options: &FusionOptions, progress: ProgressFn)
     thinning::thin(cloud, options)
 }
 
+/// Whether the fusion goes on; an error ends it.
+type Check<'a> = &'a (dyn Fn() -> Result<()> + Sync);
+/// What is done with a group of views.
+type Body<'a> = &'a mut dyn FnMut(&[FusionView]) -> Result<()>;
+
 /// The views of a fusion, of which a few at a time have to be in memory.
 pub(crate) trait FusionInput {
     /// Number of views.
@@ -121,11 +126,11 @@ pub(crate) trait FusionInput {
     /// The views that may see the same surface as a view.
     fn overlap(&self, view: usize) -> &[u32];
 
-    /// Calls `body` with these views, in this order.
+    /// Calls `body` with these views, in this order, and `check` before each one that has to be read.
     ///
     /// # Errors
-    /// Views that cannot be read; what `body` returns.
-    fn with_views(&self, views: &[u32], body: &mut dyn FnMut(&[FusionView]) -> Result<()>) -> Result<()>;
+    /// Views that cannot be read; what `check` and `body` return.
+    fn with_views(&self, views: &[u32], check: Check, body: Body) -> Result<()>;
 }
 
 /// Views that are all in memory.
@@ -144,20 +149,16 @@ impl FusionInput for InMemory<'_> {
         self.0[view].overlap
     }
 
-    fn with_views(&self, views: &[u32], body: &mut dyn FnMut(&[FusionView]) -> Result<()>) -> Result<()> {
+    fn with_views(&self, views: &[u32], _: Check, body: Body) -> Result<()> {
         let group: Vec<FusionView> = views.iter().map(|&view| self.0[view as usize]).collect();
         body(&group)
     }
 }
 
 /// Calls `body` with a view and those that overlap with it, in this order.
-fn with_group(
-    input: &dyn FusionInput,
-    index: usize,
-    body: &mut dyn FnMut(&[FusionView]) -> Result<()>,
-) -> Result<()> {
+fn with_group(input: &dyn FusionInput, index: usize, check: Check, body: Body) -> Result<()> {
     let group: Vec<u32> = std::iter::once(index as u32).chain(input.overlap(index).iter().copied()).collect();
-    input.with_views(&group, body)
+    input.with_views(&group, check, body)
 }
 
 /// Fuses like [`fuse`] but does not thin the cloud, gives the points to `emit` as they are made, and has only
@@ -172,6 +173,7 @@ pub(crate) fn fuse_input(
     emit: Emit,
 ) -> Result<()> {
     let count = input.len();
+    let order = overlap::fusion_order(count, |view| input.overlap(view));
     let used: Vec<Used> = (0..count).map(|view| Used::none_of(input.camera(view).pixels())).collect();
     let total_rows: u64 = (0..count).map(|view| u64::from(input.camera(view).height)).sum();
     let mut rows_done = 0;
@@ -185,14 +187,14 @@ pub(crate) fn fuse_input(
     };
 
     let gains = match options.compensate_exposure {
-        true => exposure::gains(input, options, |index| {
-            report_share(index, compared * index as f64 / count as f64)
+        true => exposure::gains(input, options, &order, |place| {
+            report_share(order[place], compared * place as f64 / count as f64)
         })?,
         false => vec![DVec3::ONE; count],
     };
-    for index in 0..count {
-        report(index, rows_done)?;
-        with_group(input, index, &mut |group| {
+    for &index in &order {
+        let before = rows_done;
+        with_group(input, index, &|| report(index, before), &mut |group| {
             let reference = Reference::new(group, index, input.overlap(index), options);
             let height = group[0].camera.height;
             for top in (0..height).step_by(BAND_ROWS as usize) {
@@ -206,10 +208,7 @@ pub(crate) fn fuse_input(
             Ok(())
         })?;
     }
-    match count.checked_sub(1) {
-        Some(last) => report(last, rows_done),
-        None => Ok(()),
-    }
+    order.last().map_or(Ok(()), |&last| report(last, rows_done))
 }
 
 fn check_view(views: &[FusionView], index: usize) -> Result<()> {

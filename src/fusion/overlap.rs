@@ -2,7 +2,7 @@
 
 use crate::scene::{SparsePoint, Tracks, nearest_views};
 use glam::DVec3;
-use std::cmp::Ordering;
+use std::cmp::{Ordering, Reverse};
 
 /// Views that a view is compared with: a surface that as many photographs show is averaged well enough, and
 /// the maps of all of them must be in memory at the same time.
@@ -40,6 +40,36 @@ pub fn overlaps(centers: &[DVec3], points: &[SparsePoint]) -> Vec<Vec<u32>> {
         overlap.shrink_to_fit();
     }
     overlaps
+}
+
+/// The order in which views are fused: each is followed by the one of those it overlaps with that overlaps
+/// most with the same views, of equal ones the first; where none is left, by one that overlaps with a view
+/// before. So neighbors in the scene follow each other, whatever the order of their numbers, and views that
+/// are loaded when they are needed are loaded few times.
+pub(super) fn fusion_order<'a>(views: usize, overlap: impl Fn(usize) -> &'a [u32]) -> Vec<usize> {
+    let (mut is_taken, mut is_own) = (vec![false; views], vec![false; views]);
+    let mut order = Vec::with_capacity(views);
+    for start in 0..views {
+        // Views that may overlap with others that are not taken yet.
+        let mut open = vec![start];
+        while let Some(&view) = open.last() {
+            if !is_taken[view] {
+                is_taken[view] = true;
+                order.push(view);
+            }
+            let own = overlap(view);
+            own.iter().for_each(|&other| is_own[other as usize] = true);
+            let common = |other: usize| overlap(other).iter().filter(|&&view| is_own[view as usize]).count();
+            let left = own.iter().map(|&other| other as usize).filter(|&other| !is_taken[other]);
+            let next = left.max_by_key(|&other| (common(other), Reverse(other)));
+            own.iter().for_each(|&other| is_own[other as usize] = false);
+            match next {
+                Some(other) => open.push(other),
+                None => drop(open.pop()),
+            }
+        }
+    }
+    order
 }
 
 /// Two views that may see the same surface, the first of the lower number.
@@ -114,6 +144,27 @@ mod tests {
         assert_eq!(without[4], [0, 1, 2, 3]);
         assert_eq!(without[0], [1, 2, 4]);
         assert!(is_mutual(&without), "{without:?}");
+    }
+
+    #[test]
+    fn neighbors_in_the_scene_are_fused_one_after_the_other() {
+        let order = |overlaps: &[Vec<u32>]| fusion_order(overlaps.len(), |view| &overlaps[view]);
+        // Two places that were photographed by turns.
+        let by_turns: Vec<Vec<u32>> = (0..6)
+            .map(|view| (0..6).filter(|&other| other != view && other % 2 == view % 2).collect())
+            .collect();
+        assert_eq!(order(&by_turns), [0, 2, 4, 1, 3, 5]);
+        // A row of views, each with its two neighbors, whose numbers are mixed.
+        let numbers = [3, 0, 4, 1, 2];
+        let mut row = vec![Vec::new(); 5];
+        for pair in numbers.windows(2) {
+            row[pair[0]].push(pair[1] as u32);
+            row[pair[1]].push(pair[0] as u32);
+        }
+        assert_eq!(order(&row), [0, 3, 4, 1, 2]);
+        let all: Vec<Vec<u32>> = (0..4).map(|view| (0..4).filter(|&other| other != view).collect()).collect();
+        assert_eq!(order(&all), [0, 1, 2, 3]);
+        assert_eq!(order(&[vec![], vec![]]), [0, 1]);
     }
 
     #[test]

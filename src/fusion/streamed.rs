@@ -1,18 +1,22 @@
 //! Fusion of views that are loaded when they are needed: a view and those that overlap with it are in memory
 //! at a time, and as many others as a limit allows.
 
-use super::{FusionInput, FusionView};
+use super::{Body, Check, FusionInput, FusionView};
 use crate::error::Result;
 use crate::geometry::Camera;
 use crate::image::Picture;
 use crate::memory::Cache;
 use crate::scene::Maps;
+use rayon::prelude::*;
 use std::collections::HashMap;
-use std::collections::hash_map::Entry;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Bytes of a view in memory for each pixel: depth, normal, confidence, gray and color.
 const BYTES_PER_PIXEL: u64 = 24;
+
+/// Views that are read at the same time, and bytes for each of their pixels that decoding takes besides.
+const LOADED_AT_A_TIME: usize = 4;
+const DECODING_BYTES_PER_PIXEL: u64 = 8;
 
 /// A view in memory.
 pub(crate) struct LoadedView {
@@ -33,15 +37,16 @@ pub(crate) struct StreamedViews<'a> {
 }
 
 impl<'a> StreamedViews<'a> {
-    /// Keeps the views used last, of up to `limit` bytes, in memory besides those that are fused. What `load`
-    /// gives must be valid and of the camera's size.
+    /// Keeps the views used last in memory besides those that are fused, in three quarters of `limit` bytes: the
+    /// allocator keeps part of what is freed when they change. What `load` gives must be valid and of the
+    /// camera's size.
     pub(crate) fn new(
         cameras: Vec<&'a Camera>,
         overlaps: &'a [Vec<u32>],
         load: &'a (dyn Fn(usize) -> Result<LoadedView> + Sync),
         limit: usize,
     ) -> StreamedViews<'a> {
-        StreamedViews { cameras, overlaps, load, kept: Cache::new(limit), last: Mutex::default() }
+        StreamedViews { cameras, overlaps, load, kept: Cache::new(limit / 4 * 3), last: Mutex::default() }
     }
 
     fn load(&self, index: usize) -> Result<Arc<LoadedView>> {
@@ -67,15 +72,18 @@ impl FusionInput for StreamedViews<'_> {
         &self.overlaps[view]
     }
 
-    fn with_views(&self, views: &[u32], body: &mut dyn FnMut(&[FusionView]) -> Result<()>) -> Result<()> {
+    fn with_views(&self, views: &[u32], check: Check, body: Body) -> Result<()> {
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
         // Others are dropped before any is loaded: one group at a time is in memory, besides the cache.
         last.retain(|view, _| views.contains(&(*view as u32)));
-        for &view in views {
-            let view = view as usize;
-            if let Entry::Vacant(place) = last.entry(view) {
-                place.insert(self.load(view)?);
-            }
+        let missing: Vec<usize> =
+            views.iter().map(|&view| view as usize).filter(|view| !last.contains_key(view)).collect();
+        for some in missing.chunks(LOADED_AT_A_TIME) {
+            let load = |&view: &usize| {
+                check()?;
+                Ok((view, self.load(view)?))
+            };
+            last.extend(some.par_iter().with_max_len(1).map(load).collect::<Result<Vec<_>>>()?);
         }
         let view = |&view: &u32| {
             let (view, loaded) = (view as usize, &last[&(view as usize)]);
@@ -94,11 +102,13 @@ impl FusionInput for StreamedViews<'_> {
 }
 
 /// Bytes that the fusion of streamed views needs: the largest group of a view and those it is compared with,
-/// and one bit for each pixel of all views, which tells whether it is part of a point.
+/// what decoding takes, and one bit for each pixel of all views, which tells whether it is part of a point.
 pub(crate) fn streamed_bytes(cameras: &[&Camera], overlaps: &[Vec<u32>]) -> u64 {
     let bytes = |view: usize| cameras[view].pixels() as u64 * BYTES_PER_PIXEL;
     let group =
         |view: usize| bytes(view) + overlaps[view].iter().map(|&other| bytes(other as usize)).sum::<u64>();
     let pixels: u64 = cameras.iter().map(|camera| camera.pixels() as u64).sum();
-    (0..cameras.len()).map(group).max().unwrap_or(0) + pixels / 8
+    let largest = cameras.iter().map(|camera| camera.pixels() as u64).max().unwrap_or(0);
+    let decoding = largest * DECODING_BYTES_PER_PIXEL * LOADED_AT_A_TIME as u64;
+    (0..cameras.len()).map(group).max().unwrap_or(0) + decoding + pixels / 8
 }
