@@ -14,8 +14,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Bytes of a view in memory for each pixel: depth, normal, confidence, gray and color.
 const BYTES_PER_PIXEL: u64 = 24;
 
-/// Views that are read at the same time, and bytes for each of their pixels that decoding takes besides.
+/// Views that are read at the same time, at most: where there is memory for so many times their bytes. The
+/// allocator has a heap for each thread, and keeps part of what is freed in each.
 const LOADED_AT_A_TIME: usize = 4;
+const HEAP_FACTOR: usize = 8;
+/// Bytes for each pixel that decoding takes besides.
 const DECODING_BYTES_PER_PIXEL: u64 = 8;
 
 /// A view in memory.
@@ -32,6 +35,7 @@ pub(crate) struct StreamedViews<'a> {
     overlaps: &'a [Vec<u32>],
     load: &'a (dyn Fn(usize) -> Result<LoadedView> + Sync),
     kept: Cache<usize, LoadedView>,
+    loaded_at_a_time: usize,
     /// The views of the last group, which the next one has mostly in common.
     last: Mutex<HashMap<usize, Arc<LoadedView>>>,
 }
@@ -46,7 +50,11 @@ impl<'a> StreamedViews<'a> {
         load: &'a (dyn Fn(usize) -> Result<LoadedView> + Sync),
         limit: usize,
     ) -> StreamedViews<'a> {
-        StreamedViews { cameras, overlaps, load, kept: Cache::new(limit / 4 * 3), last: Mutex::default() }
+        let largest =
+            cameras.iter().map(|camera| camera.pixels() * BYTES_PER_PIXEL as usize).max().unwrap_or(0);
+        let loaded_at_a_time = (limit / (HEAP_FACTOR * largest).max(1)).clamp(1, LOADED_AT_A_TIME);
+        let kept = Cache::new(limit / 4 * 3);
+        StreamedViews { cameras, overlaps, load, kept, loaded_at_a_time, last: Mutex::default() }
     }
 
     fn load(&self, index: usize) -> Result<Arc<LoadedView>> {
@@ -78,7 +86,7 @@ impl FusionInput for StreamedViews<'_> {
         last.retain(|view, _| views.contains(&(*view as u32)));
         let missing: Vec<usize> =
             views.iter().map(|&view| view as usize).filter(|view| !last.contains_key(view)).collect();
-        for some in missing.chunks(LOADED_AT_A_TIME) {
+        for some in missing.chunks(self.loaded_at_a_time) {
             let load = |&view: &usize| {
                 check()?;
                 Ok((view, self.load(view)?))
