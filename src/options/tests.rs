@@ -35,7 +35,9 @@ fn a_unique_name_needs_no_group() {
     assert_eq!(Options::info("window_radius").unwrap().name, "window.window_radius");
     let error = Options::info("depth_tolerance").unwrap_err().to_string();
     assert!(error.contains("check.depth_tolerance, fusion.depth_tolerance"), "{error}");
-    assert!(Options::info("tolerance").unwrap_err().to_string().contains("window.window_radius"));
+    let similar = Options::info("tolerance").unwrap_err().to_string();
+    assert!(similar.contains("check.depth_tolerance") && !similar.contains("window_radius"), "{similar}");
+    assert!(Options::info("nonsense").unwrap_err().to_string().contains("window.window_radius"));
 }
 
 #[test]
