@@ -66,7 +66,10 @@ fn the_log_level_debug_prints_what_a_run_is_made_of_and_error_no_warnings() {
         text(&done.stderr).to_owned()
     };
     let printed = planned("debug");
-    assert!(printed.contains(", SIMD level ") && printed.contains("search.employed_bees="), "{printed}");
+    assert!(
+        printed.contains(", SIMD level ") && printed.contains("cost.best_views=3, by default 4"),
+        "{printed}"
+    );
     assert!(printed.contains("view 0, key.jpg: ") && printed.contains(", sources source"), "{printed}");
     assert!(!planned("info").contains("SIMD level"));
     assert_eq!(planned("warning"), "");
