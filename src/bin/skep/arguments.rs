@@ -1,7 +1,7 @@
 //! The arguments of the command line, and their help.
 
 use crate::options_file;
-use crate::output_arguments::{CloudArguments, Convert};
+use crate::output_arguments::{BoundsArguments, CloudArguments, Convert};
 use crate::progress::Messages;
 use crate::run_arguments::Run;
 use crate::streams::LogLevel;
@@ -209,6 +209,8 @@ pub struct Fuse {
     output: Option<PathBuf>,
     #[command(flatten)]
     cloud: CloudArguments,
+    #[command(flatten)]
+    bounds: BoundsArguments,
     /// Start from the options in FILE, a report.json of a run or an object with options, instead of the
     /// defaults
     #[arg(long, value_name = "FILE")]
@@ -235,7 +237,8 @@ impl Fuse {
         let changes_nothing = self.options.is_none()
             && self.set.is_empty()
             && self.min_confidence.is_none()
-            && self.cloud.are_default();
+            && self.cloud.are_default()
+            && self.bounds.are_default();
         let is_run = self.workspace.join("run").join("manifest.json").is_file();
         changes_nothing && self.scene.is_none() && self.output.is_none() && is_run
     }
@@ -253,6 +256,7 @@ impl Fuse {
             options.fusion.min_confidence = least;
         }
         self.cloud.apply(&mut options)?;
+        self.bounds.apply(&mut options)?;
         options.check()?;
         let file = self.cloud.file(self.output.as_deref(), &self.workspace, &options)?;
         Ok((options, file))

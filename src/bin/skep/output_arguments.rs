@@ -1,8 +1,53 @@
 //! The arguments on what a command writes.
 
 use clap::{Args, ValueEnum};
-use skep::{CloudFormat, Options, Result, ViewFiles};
+use skep::{CloudFormat, Error, Options, Result, ViewFiles};
 use std::path::{Path, PathBuf};
+
+/// The numbers of a box.
+const CORNERS: [&str; 6] = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"];
+
+/// The part of the world that is wanted.
+#[derive(Args)]
+pub struct BoundsArguments {
+    /// Box of the world in which surfaces are reconstructed, along the axes of the model
+    #[arg(long, num_args = 6, value_names = CORNERS, allow_negative_numbers = true)]
+    bounds: Option<Vec<f64>>,
+    /// The same, from a file with the six numbers; lines that begin with # are comments
+    #[arg(long, value_name = "FILE", conflicts_with = "bounds")]
+    bounds_file: Option<PathBuf>,
+}
+
+impl BoundsArguments {
+    /// Whether none of them is given.
+    pub fn are_default(&self) -> bool {
+        self.bounds.is_none() && self.bounds_file.is_none()
+    }
+
+    /// Sets the option, if it is given.
+    ///
+    /// # Errors
+    /// A file that cannot be read; other than six numbers, or no box.
+    pub fn apply(&self, options: &mut Options) -> Result<()> {
+        const NAME: &str = "input.bounds";
+        if let Some(numbers) = &self.bounds {
+            let text: Vec<String> = numbers.iter().map(f64::to_string).collect();
+            options.set(NAME, &text.join(" "))?;
+        }
+        if let Some(file) = &self.bounds_file {
+            let text = std::fs::read_to_string(file)
+                .map_err(|error| Error::file(file, format!("cannot be read: {error}")))?;
+            let lines: Vec<&str> = text.lines().filter(|line| !line.trim_start().starts_with('#')).collect();
+            let numbers = lines.join(" ");
+            if numbers.trim().is_empty() {
+                let expected = format!("it has no numbers; expected the six of options.{NAME}");
+                return Err(Error::file(file, expected));
+            }
+            options.set(NAME, &numbers).map_err(|error| Error::file(file, error.to_string()))?;
+        }
+        Ok(())
+    }
+}
 
 /// The cloud.
 #[derive(Args)]
@@ -167,6 +212,26 @@ pub struct Convert {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_box_is_read_from_a_file_and_errors_name_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("box.txt");
+        let read = |text: &str| {
+            std::fs::write(&file, text).unwrap();
+            let mut options = Options::default();
+            let arguments = BoundsArguments { bounds: None, bounds_file: Some(file.clone()) };
+            arguments.apply(&mut options).map(|()| options).map_err(|error| error.to_string())
+        };
+        let mut expected = Options::default();
+        expected.set("input.bounds", "-1 -2 0 3 4 5.5").unwrap();
+        let found = read("# least, most\n-1, -2, 0\n3\t4 5.5\n").unwrap().input.bounds();
+        assert_eq!(found, expected.input.bounds());
+        for wrong in ["", "1 2 3", "1 2 3 0 0 0", "a b c d e f"] {
+            let error = read(wrong).unwrap_err();
+            assert!(error.contains("box.txt") && error.contains("input.bounds"), "{wrong}: {error}");
+        }
+    }
 
     #[test]
     fn the_page_is_one_of_the_files() {

@@ -2,7 +2,7 @@
 
 use crate::arguments::{bytes, setting};
 use crate::options_file;
-use crate::output_arguments::OutputArguments;
+use crate::output_arguments::{BoundsArguments, OutputArguments};
 use crate::progress::Messages;
 use clap::{Args, ValueEnum};
 use skep::{DepthRange, Options, Result};
@@ -63,9 +63,6 @@ pub struct Run {
     pub messages: Messages,
 }
 
-/// The numbers of a box.
-const CORNERS: [&str; 6] = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"];
-
 /// What is taken from the scene.
 #[derive(Args)]
 pub struct Input {
@@ -91,17 +88,13 @@ pub struct Input {
     /// File with depth ranges of views, lines NAME NEAR FAR; other views have that of the sparse points
     #[arg(long, value_name = "FILE")]
     depth_ranges: Option<String>,
-    /// Box of the world in which surfaces are reconstructed
-    #[arg(long, num_args = 6, value_names = CORNERS, allow_negative_numbers = true)]
-    bounds: Option<Vec<f64>>,
+    #[command(flatten)]
+    bounds: BoundsArguments,
 }
 
 impl Input {
     fn set(&self, options: &mut Options) -> Result<()> {
-        let bounds = self
-            .bounds
-            .as_ref()
-            .map(|numbers| numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" "));
+        self.bounds.apply(options)?;
         let texts = [
             ("input.max_image_size", self.max_image_size.map(|size| size.to_string())),
             ("input.images", self.images.clone()),
@@ -110,7 +103,6 @@ impl Input {
             ("input.alpha_mask", self.alpha_mask.then(|| true.to_string())),
             ("input.sources", self.sources.clone()),
             ("input.depth_ranges", self.depth_ranges.clone()),
-            ("input.bounds", bounds),
         ];
         texts.iter().try_for_each(|(name, text)| text.iter().try_for_each(|text| options.set(name, text)))
     }
