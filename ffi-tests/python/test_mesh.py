@@ -76,7 +76,7 @@ def test_without_open3d_the_error_says_how_to_get_it(run_folder, monkeypatch, ca
 
     monkeypatch.setitem(sys.modules, "open3d", None)
     assert main(["mesh", str(run_folder)]) == 1
-    assert "pip install 'skep[mesh]'" in capsys.readouterr().err
+    assert "pip install open3d" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("method", ["poisson", "tsdf"])

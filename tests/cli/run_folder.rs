@@ -76,6 +76,21 @@ fn the_log_level_debug_prints_what_a_run_is_made_of_and_error_no_warnings() {
 }
 
 #[test]
+fn a_depth_range_without_sparse_points_and_results_of_others_are_warnings() {
+    let (scene, run) = (small_board(), TempDir::new().unwrap());
+    fs::write(run.path().join("fused.ply"), "of another program").unwrap();
+    let range = ["--depth-range", "1000", "2000"];
+    let arguments = ["plan", path(&scene), "--quiet", "--output", path(&run)];
+    let done = skep(&[&arguments[..], &range].concat());
+    let printed = text(&done.stderr);
+    assert!(printed.contains("warning: 0 of ") && printed.contains("--depth-range 1000 2000"), "{printed}");
+    assert!(printed.contains("results of another program (fused.ply)"), "{printed}");
+    let again = skep(&[&arguments[..], &["--depth-range", "0.3", "3"]].concat());
+    assert!(!text(&again.stderr).contains("another program"), "{}", text(&again.stderr));
+    assert!(!text(&again.stderr).contains("sparse points"), "{}", text(&again.stderr));
+}
+
+#[test]
 fn the_tasks_one_by_one_give_the_same_bits_and_may_be_repeated() {
     let (scene, output) = finished();
     let run = TempDir::new().unwrap();

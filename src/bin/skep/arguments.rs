@@ -6,7 +6,7 @@ use crate::progress::Messages;
 use crate::run_arguments::Run;
 use crate::streams::LogLevel;
 use clap::{Args, Parser, Subcommand};
-use skep::{Options, Result};
+use skep::{Error, Options, Result};
 use std::ops::Range;
 use std::path::PathBuf;
 
@@ -239,8 +239,12 @@ impl Fuse {
             && self.min_confidence.is_none()
             && self.cloud.are_default()
             && self.bounds.are_default();
-        let is_run = self.workspace.join("run").join("manifest.json").is_file();
-        changes_nothing && self.scene.is_none() && self.output.is_none() && is_run
+        changes_nothing && self.scene.is_none() && self.replaces_cloud_of_run()
+    }
+
+    /// Whether the cloud is written where a run of skep wrote its own.
+    pub fn replaces_cloud_of_run(&self) -> bool {
+        self.output.is_none() && self.workspace.join("run").join("manifest.json").is_file()
     }
 
     /// The options of the fusion and of its output, its threads and memory, and the file of the cloud.
@@ -250,6 +254,11 @@ impl Fuse {
             options_file::apply(file, &mut options)?;
         }
         for (name, value) in &self.set {
+            let known = Options::info(name)?.name;
+            if !known.starts_with("fusion.") && !known.starts_with("output.") && known != "input.bounds" {
+                let expected = "an option of the group fusion: the maps are there already";
+                return Err(Error::argument("--set", name, expected));
+            }
             options.set(name, value)?;
         }
         if let Some(least) = self.min_confidence {

@@ -31,6 +31,12 @@ pub fn run(arguments: &Fuse, interrupt: &Interrupt) -> Result<(), Failure> {
     let maps = workspace.maps(&scene)?;
     missing_files(&maps).iter().for_each(|warning| streams::warning(warning));
 
+    if arguments.replaces_cloud_of_run() {
+        streams::warning(
+            "the cloud of the run is replaced: its reports are of the one before, and `skep reconstruct` makes that \
+             again; --output FILE keeps both",
+        );
+    }
     let reporter = display.start();
     let progress = |progress: &Progress| {
         reporter.show(progress);

@@ -55,7 +55,13 @@ fn main() -> ExitCode {
         Command::Man(arguments) => documents::manual(&arguments),
     };
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => match streams::lost_results() {
+            None => ExitCode::SUCCESS,
+            Some(error) => {
+                streams::notice(&format!("error: results cannot be written on standard output: {error}"));
+                ExitCode::from(FAILED)
+            }
+        },
         Err(Failure::Usage(error)) => fail(&error, USAGE),
         Err(Failure::Run(Error::Cancelled)) => ExitCode::from(interrupt.status()),
         Err(Failure::Run(error)) => fail(&error, FAILED),

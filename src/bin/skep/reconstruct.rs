@@ -10,7 +10,7 @@ use crate::run_arguments::Run;
 use crate::stopwatch::{Stage, Stopwatch};
 use crate::{Failure, dump, streams};
 use skep::job::{Job, Needs, Summary};
-use skep::{Error, PixelStatus, Progress, Result, format_bytes};
+use skep::{DepthRange, Error, PixelStatus, Progress, Result, SparsePoint, format_bytes};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -141,21 +141,65 @@ pub fn plan(run: &Run, display: Display, interrupt: &Interrupt) -> std::result::
         reporter.show(progress);
         interrupt.control_flow()
     };
-    let job = Job::plan(&run.scene, depth_range, &options, &run.output(), run.fresh, &progress).inspect_err(
-        |error| {
+    let output = run.output();
+    foreign_results(&output).iter().for_each(|warning| streams::warning(warning));
+    let job =
+        Job::plan(&run.scene, depth_range, &options, &output, run.fresh, &progress).inspect_err(|error| {
             if *error == Error::Cancelled {
                 streams::notice("interrupted while reading: nothing was changed");
             }
-        },
-    )?;
+        })?;
     drop(reporter);
     job.notices().iter().for_each(|notice| streams::warning(notice));
     job.scene().warnings().iter().for_each(|warning| streams::warning(warning));
+    depth_range.and_then(|range| misplaced(&job, range)).iter().for_each(|warning| streams::warning(warning));
     details(&job).iter().for_each(|line| display.detail(line));
     display.print(&needs(&job));
     let threads = skep::thread_count(job.scene(), &options);
     fewer_threads(options.threads, threads).iter().for_each(|line| display.print(line));
     Ok(job)
+}
+
+/// Names the results in a folder that no run of skep left there; files of the same names are replaced.
+fn foreign_results(output: &Path) -> Option<String> {
+    let is_own = output.join("run").is_dir() || output.join("report.json").is_file();
+    let has_maps =
+        |folder: &Path| std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
+    let mut found = Vec::new();
+    found.extend(output.join("fused.ply").is_file().then_some("fused.ply"));
+    found.extend(has_maps(&output.join("stereo").join("depth_maps")).then_some("stereo"));
+    (!is_own && !found.is_empty()).then(|| {
+        format!(
+            "{} has results of another program ({}), of which those of the same names are replaced; --output DIR \
+             takes another folder",
+            output.display(),
+            found.join(", ")
+        )
+    })
+}
+
+/// Fraction of the depths of sparse points that a depth range for all views should have, at least.
+const LEAST_INSIDE: f64 = 0.1;
+
+/// A warning of a depth range that has hardly any of the sparse points.
+fn misplaced(job: &Job, range: DepthRange) -> Option<String> {
+    let scene = job.scene();
+    let depth =
+        |view: &u32, point: &SparsePoint| scene.views()[*view as usize].camera.to_camera(point.position).z;
+    let depths: Vec<f64> =
+        scene.points().iter().flat_map(|point| point.views.iter().map(|view| depth(view, point))).collect();
+    let inside = depths.iter().filter(|&&depth| range.near <= depth && depth <= range.far).count();
+    let (near, far) =
+        (depths.iter().copied().fold(f64::INFINITY, f64::min), depths.iter().copied().fold(0.0, f64::max));
+    ((inside as f64) < LEAST_INSIDE * depths.len() as f64).then(|| {
+        format!(
+            "{inside} of {} depths of the sparse points lie in --depth-range {} {}; they lie from {near:.4} to \
+             {far:.4}: what is found elsewhere may be no surface",
+            depths.len(),
+            range.near,
+            range.far
+        )
+    })
 }
 
 /// What the run needs, in a line.

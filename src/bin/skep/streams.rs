@@ -1,4 +1,5 @@
-//! Standard output and error, and the log level. Failed writes are ignored: a closed pipe must not stop a run.
+//! Standard output and error, and the log level. A failed write stops no run; one of results, other than to a
+//! closed pipe, makes the exit status that of a failure.
 
 use clap::ValueEnum;
 use std::io::{IsTerminal, Write};
@@ -41,9 +42,27 @@ pub fn is_screen() -> bool {
     std::io::stderr().is_terminal() && !is_dumb
 }
 
+/// Why results could not be written on standard output, if they could not.
+static LOST: OnceLock<String> = OnceLock::new();
+
 /// Prints a line of the result on standard output.
 pub fn result(line: &str) {
-    let _ = writeln!(std::io::stdout(), "{line}");
+    write_result(&format!("{line}\n"));
+}
+
+/// Writes results on standard output.
+pub fn write_result(text: &str) {
+    let written = std::io::stdout().write_all(text.as_bytes()).and_then(|()| std::io::stdout().flush());
+    if let Err(error) = written
+        && error.kind() != std::io::ErrorKind::BrokenPipe
+    {
+        let _ = LOST.set(error.to_string());
+    }
+}
+
+/// Why results could not be written, if they could not.
+pub fn lost_results() -> Option<&'static str> {
+    LOST.get().map(String::as_str)
 }
 
 /// Prints a line about the run on standard error: progress, warnings, errors.

@@ -44,7 +44,7 @@ def open3d() -> Any:
     try:
         return importlib.import_module("open3d")
     except ImportError as error:
-        text = f"meshes need open3d, which cannot be imported: {error}; pip install 'skep[mesh]' brings it"
+        text = f"meshes need open3d, which cannot be imported: {error}; pip install open3d brings it"
         raise ImportError(text) from error
 
 
@@ -176,7 +176,7 @@ def drop_small(mesh: Any, triangles: int) -> None:
 
 def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
-        "skep mesh", description="Make a mesh of the results of a run, with Open3D: pip install 'skep[mesh]'."
+        "skep mesh", description="Make a mesh of the results of a run, with Open3D: pip install open3d."
     )
     add = made.add_argument
     add("run", type=Path, metavar="RUN", help="folder of the results of `skep reconstruct`")
