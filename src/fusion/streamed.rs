@@ -41,8 +41,8 @@ pub(crate) struct StreamedViews<'a> {
 }
 
 impl<'a> StreamedViews<'a> {
-    /// Keeps the views used last in memory besides those that are fused, in three quarters of `limit` bytes: the
-    /// allocator keeps part of what is freed when they change. What `load` gives must be valid and of the
+    /// Keeps the views used last in memory besides those that are fused, in three quarters of `limit` bytes:
+    /// the allocator keeps part of what is freed when they change. What `load` gives must be valid and of the
     /// camera's size.
     pub(crate) fn new(
         cameras: Vec<&'a Camera>,

@@ -26,8 +26,8 @@ pub fn manual(arguments: &Man) -> Result<(), Failure> {
     Ok(written.map_err(|error| Error::file(folder, format!("manual pages cannot be written: {error}")))?)
 }
 
-/// Writes the manual page of a command. What its help has after the arguments is laid out by hand, so it is kept
-/// as it is.
+/// Writes the manual page of a command. What its help has after the arguments is laid out by hand, so it is
+/// kept as it is.
 fn page(command: clap::Command, folder: &Path) -> std::io::Result<()> {
     let name = command.get_display_name().unwrap_or_else(|| command.get_name()).to_owned();
     let more = command.get_after_help().map(ToString::to_string).unwrap_or_default();

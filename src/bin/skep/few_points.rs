@@ -11,8 +11,8 @@ const THIN_CLOUD: f64 = 0.01;
 /// most. One of the six statuses always has more.
 const LARGE_SHARE: f64 = 10.0;
 
-/// `empty` or `thin` for a cloud of few points, of maps with so many pixels. A cloud that was thinned on demand
-/// is not thin.
+/// `empty` or `thin` for a cloud of few points, of maps with so many pixels. A cloud that was thinned on
+/// demand is not thin.
 pub fn few_points(points: u64, pixels: u64, options: &FusionOptions) -> Option<&'static str> {
     let is_thinned = options.voxel_size > 0.0 || options.max_points > 0;
     match points {
@@ -71,8 +71,8 @@ impl<'a> Outcome<'a> {
         lines
     }
 
-    /// One sentence on an empty or thin cloud, with the most frequent statuses of the pixels and the remedies;
-    /// nothing for other clouds.
+    /// One sentence on an empty or thin cloud, with the most frequent statuses of the pixels and the
+    /// remedies; nothing for other clouds.
     pub fn warning(&self) -> Option<String> {
         let cloud = self.few_points()?;
         let mut statuses = PixelStatus::ALL;
@@ -98,7 +98,8 @@ impl<'a> Outcome<'a> {
         let (others, wanted) = (self.views - 1, self.options.check.min_consistent_views as usize);
         (others < wanted).then(|| {
             format!(
-                "{} views cannot confirm a depth in {wanted} other ones: --set check.min_consistent_views={others}",
+                "{} views cannot confirm a depth in {wanted} other ones: --set \
+                 check.min_consistent_views={others}",
                 self.views
             )
         })
@@ -110,8 +111,8 @@ impl<'a> Outcome<'a> {
         let (references, others) = (self.ranges.len(), self.ranges.len() - 1);
         if others < agreeing && references < self.views {
             return Some(format!(
-                "a point needs {agreeing} other views with maps that agree, and {references} of {} views have \
-                 maps: name more with --reference, or --set fusion.min_agreeing_views={others}",
+                "a point needs {agreeing} other views with maps that agree, and {references} of {} views \
+                 have maps: name more with --reference, or --set fusion.min_agreeing_views={others}",
                 self.views
             ));
         }
@@ -234,8 +235,8 @@ mod tests {
         let options = Options::default();
         let counts = totals(0, [900, 0, 100, 0, 0, 0]);
         let warning = outcome(&counts, &options, 2, 7).warning().unwrap();
-        let end = "a point needs 3 other views with maps that agree, and 2 of 7 views have maps: name more with \
-                   --reference, or --set fusion.min_agreeing_views=1";
+        let end = "a point needs 3 other views with maps that agree, and 2 of 7 views have maps: name more \
+                   with --reference, or --set fusion.min_agreeing_views=1";
         assert!(warning.ends_with(end), "{warning}");
     }
 }

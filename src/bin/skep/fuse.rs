@@ -33,8 +33,8 @@ pub fn run(arguments: &Fuse, interrupt: &Interrupt) -> Result<(), Failure> {
 
     if arguments.replaces_cloud_of_run() {
         streams::warning(
-            "the cloud of the run is replaced: its reports are of the one before, and `skep reconstruct` makes that \
-             again; --output FILE keeps both",
+            "the cloud of the run is replaced: its reports are of the one before, and `skep reconstruct` \
+             makes that again; --output FILE keeps both",
         );
     }
     let reporter = display.start();

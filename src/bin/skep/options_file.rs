@@ -1,12 +1,10 @@
 //! Options from a file: `--options`.
 
+use crate::text_file;
 use serde_json::{Map, Value};
 use skep::{Error, Options, Result};
-use std::io::Read;
 use std::path::Path;
 
-/// Bytes of a file, at most: a report has some kilobytes for each view.
-const MOST_BYTES: u64 = 256 << 20;
 /// Options of the machine, which do not change the result.
 const OF_MACHINE: [&str; 3] = ["threads", "memory", "simd"];
 
@@ -15,14 +13,7 @@ const OF_MACHINE: [&str; 3] = ["threads", "memory", "simd"];
 /// # Errors
 /// A file that cannot be read or is no such object; an option that does not exist or has no such value.
 pub fn apply(file: &Path, options: &mut Options) -> Result<()> {
-    let mut text = String::new();
-    let read = std::fs::File::open(file)
-        .and_then(|opened| opened.take(MOST_BYTES).read_to_string(&mut text))
-        .map_err(|error| Error::file(file, format!("cannot be read: {error}")))?;
-    if read as u64 == MOST_BYTES {
-        let expected = "expected a report.json of skep, or an object with options by name";
-        return Err(Error::file(file, format!("larger than any such file; {expected}")));
-    }
+    let text = text_file::read(file)?;
     let found = parse(&text).map_err(|error| Error::file(file, error))?;
     for (name, value) in found.iter().filter(|(name, _)| !OF_MACHINE.contains(&name.as_str())) {
         let set = match value {

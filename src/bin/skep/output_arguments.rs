@@ -1,11 +1,12 @@
 //! The arguments on what a command writes.
 
+use crate::text_file;
 use clap::{Args, ValueEnum};
 use skep::{CloudFormat, Error, Options, Result, ViewFiles};
 use std::path::{Path, PathBuf};
 
 /// The numbers of a box.
-const CORNERS: [&str; 6] = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"];
+pub const CORNERS: [&str; 6] = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"];
 
 /// The part of the world that is wanted.
 #[derive(Args)]
@@ -35,8 +36,7 @@ impl BoundsArguments {
             options.set(NAME, &text.join(" "))?;
         }
         if let Some(file) = &self.bounds_file {
-            let text = std::fs::read_to_string(file)
-                .map_err(|error| Error::file(file, format!("cannot be read: {error}")))?;
+            let text = text_file::read(file)?;
             let lines: Vec<&str> = text.lines().filter(|line| !line.trim_start().starts_with('#')).collect();
             let numbers = lines.join(" ");
             if numbers.trim().is_empty() {

@@ -1,6 +1,6 @@
 //! Progress on standard error: a bar on a terminal, plain lines, or lines of JSON for programs.
 
-use crate::streams::{self, LogLevel};
+use crate::streams;
 use crate::time_left::{TimeLeft, clock};
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -85,13 +85,6 @@ impl Display {
             Display::Silent => (),
             Display::Shown(ProgressForm::Json) => streams::notice(&json!({ "message": line }).to_string()),
             Display::Shown(ProgressForm::Bar | ProgressForm::Plain) => streams::notice(line),
-        }
-    }
-
-    /// Prints a line that helps to find out what a run does, at the log level debug.
-    pub fn detail(self, line: &str) {
-        if streams::is_shown(LogLevel::Debug) {
-            self.print(line);
         }
     }
 

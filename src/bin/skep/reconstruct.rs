@@ -8,9 +8,10 @@ use crate::progress::Display;
 use crate::report::{self, PAGE_NAME, PageOptions, Report, RunFiles, Totals};
 use crate::run_arguments::Run;
 use crate::stopwatch::{Stage, Stopwatch};
+use crate::streams::LogLevel;
 use crate::{Failure, dump, streams};
 use skep::job::{Job, Needs, Summary};
-use skep::{DepthRange, Error, PixelStatus, Progress, Result, SparsePoint, format_bytes};
+use skep::{DepthRange, Error, PixelStatus, Progress, Result, format_bytes};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -153,7 +154,9 @@ pub fn plan(run: &Run, display: Display, interrupt: &Interrupt) -> std::result::
     job.notices().iter().for_each(|notice| streams::warning(notice));
     job.scene().warnings().iter().for_each(|warning| streams::warning(warning));
     depth_range.and_then(|range| misplaced(&job, range)).iter().for_each(|warning| streams::warning(warning));
-    details(&job).iter().for_each(|line| display.detail(line));
+    if streams::is_shown(LogLevel::Debug) {
+        details(&job).iter().for_each(|line| display.print(line));
+    }
     display.print(&needs(&job));
     let threads = skep::thread_count(job.scene(), &options);
     fewer_threads(options.threads, threads).iter().for_each(|line| display.print(line));
@@ -170,8 +173,8 @@ fn foreign_results(output: &Path) -> Option<String> {
     found.extend(has_maps(&output.join("stereo").join("depth_maps")).then_some("stereo"));
     (!is_own && !found.is_empty()).then(|| {
         format!(
-            "{} has results of another program ({}), of which those of the same names are replaced; --output DIR \
-             takes another folder",
+            "{} has results of another program ({}), of which those of the same names are replaced; \
+             --output DIR takes another folder",
             output.display(),
             found.join(", ")
         )
@@ -184,20 +187,20 @@ const LEAST_INSIDE: f64 = 0.1;
 /// A warning of a depth range that has hardly any of the sparse points.
 fn misplaced(job: &Job, range: DepthRange) -> Option<String> {
     let scene = job.scene();
-    let depth =
-        |view: &u32, point: &SparsePoint| scene.views()[*view as usize].camera.to_camera(point.position).z;
-    let depths: Vec<f64> =
-        scene.points().iter().flat_map(|point| point.views.iter().map(|view| depth(view, point))).collect();
-    let inside = depths.iter().filter(|&&depth| range.near <= depth && depth <= range.far).count();
-    let (near, far) =
-        (depths.iter().copied().fold(f64::INFINITY, f64::min), depths.iter().copied().fold(0.0, f64::max));
-    ((inside as f64) < LEAST_INSIDE * depths.len() as f64).then(|| {
+    let (mut all, mut inside, mut near, mut far) = (0_u64, 0_u64, f64::INFINITY, 0.0_f64);
+    for point in scene.points() {
+        for &view in &point.views {
+            let depth = scene.views()[view as usize].camera.to_camera(point.position).z;
+            all += 1;
+            inside += u64::from(range.near <= depth && depth <= range.far);
+            (near, far) = (near.min(depth), far.max(depth));
+        }
+    }
+    ((inside as f64) < LEAST_INSIDE * all as f64).then(|| {
         format!(
-            "{inside} of {} depths of the sparse points lie in --depth-range {} {}; they lie from {near:.4} to \
-             {far:.4}: what is found elsewhere may be no surface",
-            depths.len(),
-            range.near,
-            range.far
+            "{inside} of {all} depths of the sparse points lie in --depth-range {} {}; they lie from \
+             {near:.4} to {far:.4}: what is found elsewhere may be no surface",
+            range.near, range.far
         )
     })
 }

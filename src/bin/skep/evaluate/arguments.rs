@@ -98,7 +98,7 @@ pub struct RegionArguments {
     #[arg(long, value_name = "FILE")]
     pub transform: Option<PathBuf>,
     /// Box in the frame of the truth outside of which no point counts
-    #[arg(long, num_args = 6, value_names = super::regions::CORNERS, allow_negative_numbers = true)]
+    #[arg(long, num_args = 6, value_names = crate::output_arguments::CORNERS, allow_negative_numbers = true)]
     pub crop_box: Option<Vec<f64>>,
     /// The same with the polygon of a JSON file, as Tanks and Temples has them
     #[arg(long, value_name = "FILE")]

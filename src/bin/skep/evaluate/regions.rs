@@ -1,13 +1,11 @@
 //! Which points count: alignment, boxes and polygons.
 
 use super::arguments::RegionArguments;
+use crate::text_file;
 use glam::{DMat4, DVec3};
 use serde::Deserialize;
 use skep::{Error, Result};
 use std::path::Path;
-
-/// The numbers of a box.
-pub const CORNERS: [&str; 6] = ["X0", "Y0", "Z0", "X1", "Y1", "Z1"];
 
 /// What the arguments say about places, except for DTU's masks.
 pub struct Region {
@@ -64,13 +62,9 @@ fn corners(numbers: &[f64]) -> Result<(DVec3, DVec3)> {
     Ok((min, max))
 }
 
-fn text(path: &Path) -> Result<String> {
-    std::fs::read_to_string(path).map_err(|error| Error::file(path, format!("cannot be read: {error}")))
-}
-
 /// A matrix of four rows; lines that begin with `#` do not count.
 fn read_matrix(path: &Path) -> Result<DMat4> {
-    let text = text(path)?;
+    let text = text_file::read(path)?;
     let words =
         text.lines().filter(|line| !line.trim_start().starts_with('#')).flat_map(str::split_whitespace);
     let numbers: Option<Vec<f64>> = words.map(|word| word.parse().ok()).collect();
@@ -85,7 +79,7 @@ fn read_matrix(path: &Path) -> Result<DMat4> {
 }
 
 fn read_volume(path: &Path) -> Result<Volume> {
-    let volume: Volume = serde_json::from_str(&text(path)?)
+    let volume: Volume = serde_json::from_str(&text_file::read(path)?)
         .map_err(|error| Error::file(path, format!("{error}; expected a selection volume of Open3D")))?;
     if !["X", "Y", "Z"].contains(&volume.orthogonal_axis.as_str()) {
         let problem = format!("orthogonal_axis is {:?}; expected X, Y or Z", volume.orthogonal_axis);
