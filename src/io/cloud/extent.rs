@@ -9,6 +9,7 @@ const MAX_ERROR: f64 = 0.125;
 /// Fraction of the points with such an error for which 32-bit floats do not suffice.
 const MAX_COARSE_FRACTION: f64 = 0.1;
 /// Fraction of the distances between points that are below the spacing.
+#[cfg(feature = "las")]
 const SPACING_FRACTION: f64 = 0.1;
 /// Exponents of 64-bit floats.
 const EXPONENTS: usize = 2048;
@@ -63,6 +64,7 @@ impl Extent {
 
     /// Distance of neighboring points: one of the smaller ones, within a factor of two. 0 for fewer than two
     /// points.
+    #[cfg(feature = "las")]
     pub(super) fn spacing(&self) -> f64 {
         let total: u64 = self.distances.iter().sum();
         let mut below = (total as f64 * SPACING_FRACTION).ceil() as u64;
