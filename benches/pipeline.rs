@@ -9,7 +9,7 @@ use std::path::Path;
 
 fn pipeline(criterion: &mut Criterion) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/data/board");
-    let scene = read_scene(&folder, None, &Options::default()).unwrap();
+    let scene = read_scene(&folder, None, &Options::default(), &ignore_progress).unwrap();
     let pixels: u64 = scene.views().iter().map(|view| view.camera.pixels() as u64).sum();
     let mut group = criterion.benchmark_group("seven photographs of 640 x 360");
     group.throughput(Throughput::Elements(pixels)).sample_size(10);

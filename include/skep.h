@@ -2124,6 +2124,8 @@ skep_status skep_patch_ncc(const struct skep_ncc_window *window,
  * @param near             Smallest depth of every view in world units; 0 with `far` 0 derives the ranges
  *                         from the scene.
  * @param far              Largest depth of every view in world units.
+ * @param progress_or_null  Receives the progress of reading the photographs and may cancel; NULL: none.
+ * @param user             Passed to the callback; may be NULL.
  * @param scene_out        Receives the scene; destroy it with skep_scene_destroy. skep_scene_get_warning
  *                         tells what was found out while it was read.
  * @retval SKEP_ERR_ARGUMENT  Not 0 < near < far, a choice that fits no photograph, or a scene that
@@ -2131,11 +2133,14 @@ skep_status skep_patch_ncc(const struct skep_ncc_window *window,
  * @retval SKEP_ERR_FILE      A file that is missing or cannot be used; the text names the file, the line
  *                            where there is one, and what was expected.
  * @retval SKEP_ERR_MEMORY    Photographs that do not fit.
+ * @retval SKEP_ERR_CANCELLED  The callback returned non-zero.
  */
 skep_status skep_scene_read(const char *path,
                             const struct skep_options *options_or_null,
                             double near,
                             double far,
+                            skep_progress_fn progress_or_null,
+                            void *user,
                             struct skep_scene **scene_out);
 
 /**

@@ -21,11 +21,11 @@
 //!
 //! let mut options = Options::default();
 //! options.check.min_consistent_views = 3;
-//! let scene = skep::import::read_scene("SCENE".as_ref(), None, &options)?; // or Scene::new
 //! let progress = |at: &Progress| {
 //!     eprintln!("{:.0} %", at.done * 100.0);
 //!     ControlFlow::Continue(()) // Break cancels
 //! };
+//! let scene = skep::import::read_scene("SCENE".as_ref(), None, &options, &progress)?; // or Scene::new
 //! let result = skep::reconstruct(&scene, &options, &progress)?;
 //! for (view, found) in scene.views().iter().zip(&result.views) {
 //!     let validated = found.status.iter().filter(|&&status| status == PixelStatus::Validated).count();

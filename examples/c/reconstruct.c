@@ -77,7 +77,7 @@ int main(int count, char **arguments) {
         return 2;
     }
     signal(SIGINT, interrupt);
-    check(skep_scene_read(arguments[1], NULL, 0, 0, &scene));
+    check(skep_scene_read(arguments[1], NULL, 0, 0, NULL, NULL, &scene));
     check(skep_options_create("default", &options));
     check(skep_options_set(options, "fusion.min_agreeing_views", 2));
     check(skep_reconstruct(scene, options, print_progress, NULL, &result));

@@ -126,7 +126,7 @@ int main(int count, char **arguments) {
         fprintf(stderr, "usage: %s SCENE CLOUD.ply\n", arguments[0]);
         return 2;
     }
-    check(skep_scene_read(arguments[1], NULL, 0, 0, &scene));
+    check(skep_scene_read(arguments[1], NULL, 0, 0, NULL, NULL, &scene));
     check(skep_options_create("fast", &options));
     check(skep_options_set(options, "fusion.min_agreeing_views", 2));
     check(skep_stepper_create(scene, options, &stepper));

@@ -28,7 +28,7 @@ fn reconstruct(folder: &Path, dense: &Path) -> skep::Result<()> {
     let mut options = Options { seed: 1, ..Options::default() };
     options.fusion.min_agreeing_views = 2;
     options.set("check.depth_tolerance", "0.01")?;
-    let scene = read_scene(folder, None, &options)?;
+    let scene = read_scene(folder, None, &options, &show)?;
 
     let result = skep::reconstruct(&scene, &options, &show)?;
     eprintln!();

@@ -28,7 +28,7 @@ fn main() -> ExitCode {
 
 fn run(folder: &Path) -> skep::Result<PointCloud> {
     let options = Options::default();
-    let scene = skep::import::read_scene(folder, None, &options)?;
+    let scene = skep::import::read_scene(folder, None, &options, &ignore_progress)?;
     let stepper = Stepper::new(&scene, &options)?;
     for view in 0..stepper.views() {
         println!("{} has the source views {:?}", scene.views()[view].name, stepper.sources(view));

@@ -10,6 +10,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+static int32_t cancel(void *calls, const skep_progress *progress) {
+    CHECK(progress->phase == SKEP_PHASE_READ && progress->done >= 0 && progress->done <= 1, "%g", progress->done);
+    ++*(uint32_t *)calls;
+    return 1;
+}
+
 /*
  * A scene that is written as a COLMAP folder and read again gives nearly the same cameras and the
  * same runs.
@@ -19,7 +25,11 @@ static skep_scene *check_scene(const char *folder, const scene *made, const skep
     path_in(place, folder, "scene");
     REQUIRE(skep_scene_write_colmap(handed_in, place));
     skep_scene *read = NULL;
-    REQUIRE(skep_scene_read(place, NULL, 0, 0, &read));
+    uint32_t calls = 0;
+    CHECK(skep_scene_read(place, NULL, 0, 0, cancel, &calls, &read) == SKEP_ERR_CANCELLED, "%u calls",
+          (unsigned)calls);
+    CHECK(calls == 1 && read == NULL, "%u calls", (unsigned)calls);
+    REQUIRE(skep_scene_read(place, NULL, 0, 0, NULL, NULL, &read));
     for (uint32_t view = 0; view < made->views; ++view) {
         uint32_t width = 0, height = 0;
         skep_camera camera;
@@ -49,7 +59,7 @@ static skep_scene *check_scene(const char *folder, const scene *made, const skep
     }
     skep_scene *ranged = NULL;
     double near_by = 0, far_away = 0;
-    REQUIRE(skep_scene_read(place, NULL, 1.5, 7, &ranged));
+    REQUIRE(skep_scene_read(place, NULL, 1.5, 7, NULL, NULL, &ranged));
     REQUIRE(skep_scene_get_depth_range(ranged, 1, &near_by, &far_away));
     CHECK(near_by == 1.5 && far_away == 7, "%g to %g", near_by, far_away);
     skep_scene_destroy(ranged);

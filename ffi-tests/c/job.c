@@ -21,7 +21,7 @@ static skep_cloud *prepare(const char *place, const skep_options *options) {
     scene_make(&made);
     skep_scene *handed_in = scene_hand_in(&made), *read = NULL;
     REQUIRE(skep_scene_write_colmap(handed_in, place));
-    REQUIRE(skep_scene_read(place, NULL, 0, 0, &read));
+    REQUIRE(skep_scene_read(place, NULL, 0, 0, NULL, NULL, &read));
     skep_result *result = scene_run(read, options);
     skep_cloud *cloud = NULL;
     REQUIRE(skep_result_get_cloud(result, &cloud));

@@ -22,11 +22,11 @@ static void check_null(const char *folder, const skep_scene *handed_in, const sk
     static const uint32_t COUNTS[PIXELS] = {1}, VIEW = 5;
     char file[MAX_PATH];
     path_in(file, folder, "none.bin");
-    FAILS(skep_scene_read(NULL, NULL, 0, 0, OUT(skep_scene *, 0)), SKEP_ERR_NULL, "path");
-    FAILS(skep_scene_read(folder, NULL, 0, 0, NULL), SKEP_ERR_NULL, "scene_out");
-    FAILS(skep_scene_read(folder, NULL, 2, 1, OUT(skep_scene *, 0)), SKEP_ERR_ARGUMENT,
+    FAILS(skep_scene_read(NULL, NULL, 0, 0, NULL, NULL, OUT(skep_scene *, 0)), SKEP_ERR_NULL, "path");
+    FAILS(skep_scene_read(folder, NULL, 0, 0, NULL, NULL, NULL), SKEP_ERR_NULL, "scene_out");
+    FAILS(skep_scene_read(folder, NULL, 2, 1, NULL, NULL, OUT(skep_scene *, 0)), SKEP_ERR_ARGUMENT,
           "depth range");
-    FAILS(skep_scene_read(folder, NULL, NAN, 1, OUT(skep_scene *, 0)), SKEP_ERR_ARGUMENT,
+    FAILS(skep_scene_read(folder, NULL, NAN, 1, NULL, NULL, OUT(skep_scene *, 0)), SKEP_ERR_ARGUMENT,
           "depth range");
     FAILS(skep_scene_write_colmap(NULL, file), SKEP_ERR_NULL, "scene");
     FAILS(skep_scene_write_colmap(handed_in, NULL), SKEP_ERR_NULL, "folder");
@@ -182,7 +182,8 @@ static void check_scene_folder(const char *folder, const skep_scene *handed_in) 
                                         "sparse/points3D.bin", "images/view0001.png"};
     char place[MAX_PATH], file[MAX_PATH];
     path_in(place, folder, "no such scene");
-    FAILS(skep_scene_read(place, NULL, 0, 0, OUT(skep_scene *, 0)), SKEP_ERR_FILE, "no such scene");
+    FAILS(skep_scene_read(place, NULL, 0, 0, NULL, NULL, OUT(skep_scene *, 0)), SKEP_ERR_FILE,
+          "no such scene");
     path_in(place, folder, "broken scene");
     REQUIRE(skep_scene_write_colmap(handed_in, place));
     for (size_t i = 0; i < sizeof FILES / sizeof FILES[0]; ++i) {
@@ -191,7 +192,7 @@ static void check_scene_folder(const char *folder, const skep_scene *handed_in) 
         uint8_t *bytes = read_file(file, &size);
         for (size_t cut = 0; cut < 40; ++cut) {
             write_bytes(file, bytes, size * cut / 40);
-            FAILS(skep_scene_read(place, NULL, 1, 9, OUT(skep_scene *, 0)), SKEP_ERR_FILE,
+            FAILS(skep_scene_read(place, NULL, 1, 9, NULL, NULL, OUT(skep_scene *, 0)), SKEP_ERR_FILE,
                   strrchr(FILES[i], '/') + 1);
         }
         for (size_t at = 0; at < size; at += size / 60 + 1) {
@@ -199,7 +200,7 @@ static void check_scene_folder(const char *folder, const skep_scene *handed_in) 
             bytes[at] ^= 0xFF;
             write_bytes(file, bytes, size);
             skep_scene *read = NULL;
-            const skep_status status = skep_scene_read(place, NULL, 1, 9, &read);
+            const skep_status status = skep_scene_read(place, NULL, 1, 9, NULL, NULL, &read);
             CHECK(status == SKEP_OK ||
                       (read == NULL && (status == SKEP_ERR_FILE || status == SKEP_ERR_ARGUMENT)),
                   "byte %zu of %s: %s", at, FILES[i], skep_status_name(status));
@@ -208,17 +209,17 @@ static void check_scene_folder(const char *folder, const skep_scene *handed_in) 
         }
         remove(file);
         if (i != 2) {
-            FAILS(skep_scene_read(place, NULL, 1, 9, OUT(skep_scene *, 0)), SKEP_ERR_FILE,
+            FAILS(skep_scene_read(place, NULL, 1, 9, NULL, NULL, OUT(skep_scene *, 0)), SKEP_ERR_FILE,
                   i == 3 ? "view0001.png" : "a COLMAP model");
         } else {
-            FAILS(skep_scene_read(place, NULL, 0, 0, OUT(skep_scene *, 0)), SKEP_ERR_ARGUMENT,
+            FAILS(skep_scene_read(place, NULL, 0, 0, NULL, NULL, OUT(skep_scene *, 0)), SKEP_ERR_ARGUMENT,
                   "depth range");
         }
         write_bytes(file, bytes, size);
         free(bytes);
     }
     skep_scene *read = NULL;
-    REQUIRE(skep_scene_read(place, NULL, 0, 0, &read));
+    REQUIRE(skep_scene_read(place, NULL, 0, 0, NULL, NULL, &read));
     skep_scene_destroy(read);
 }
 
@@ -231,7 +232,7 @@ static void check_places(const char *folder, const scene *made, const skep_resul
     path_in(file, folder, "a file");
     write_bytes(file, "x", 1);
     path_in(below, file, "below");
-    FAILS(skep_scene_read(file, NULL, 0, 0, OUT(skep_scene *, 0)), SKEP_ERR_FILE, "a file");
+    FAILS(skep_scene_read(file, NULL, 0, 0, NULL, NULL, OUT(skep_scene *, 0)), SKEP_ERR_FILE, "a file");
     FAILS(skep_scene_write_colmap(handed_in, below), SKEP_ERR_FILE, "cannot be written");
     FAILS(skep_result_write_workspace(result, handed_in, below), SKEP_ERR_FILE,
           "cannot be written");

@@ -18,7 +18,7 @@ using check::Owned;
 Owned<skep_scene> read_with_skep(const std::string &folder)
 {
     skep_scene *scene = nullptr;
-    must(skep_scene_read(folder.c_str(), nullptr, 0, 0, &scene));
+    must(skep_scene_read(folder.c_str(), nullptr, 0, 0, nullptr, nullptr, &scene));
     return {scene, skep_scene_destroy};
 }
 
@@ -231,7 +231,7 @@ void models_may_lack_points(const std::string &folder)
             bare.WriteBinary(theirs + "/sparse");
         }
         skep_scene *scene = nullptr;
-        must(skep_scene_read(theirs.c_str(), nullptr, 2, 8, &scene));
+        must(skep_scene_read(theirs.c_str(), nullptr, 2, 8, nullptr, nullptr, &scene));
         const Owned<skep_scene> owned(scene, skep_scene_destroy);
         check::expect_at_most(camera_difference(scene, bare), 1e-12, "cameras differ by");
         EXPECT(skep_scene_validate(scene) == SKEP_OK);
@@ -252,7 +252,7 @@ void distorted_cameras_are_undistorted(const std::string &folder)
     std::filesystem::create_symlink(folder + "/images", theirs + "/images");
     model.WriteBinary(theirs + "/sparse");
     skep_scene *scene = nullptr;
-    must(skep_scene_read(theirs.c_str(), nullptr, 0, 0, &scene));
+    must(skep_scene_read(theirs.c_str(), nullptr, 0, 0, nullptr, nullptr, &scene));
     const Owned<skep_scene> owned(scene, skep_scene_destroy);
     uint32_t width = 0, height = 0;
     skep_camera pinhole;

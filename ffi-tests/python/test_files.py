@@ -48,6 +48,11 @@ def test_a_scene_folder_comes_back_as_it_was_written(tmp_path):
         np.testing.assert_allclose(read.camera(view).K, scene.camera(view).K, atol=1e-9)
         np.testing.assert_allclose(read.camera(view).t, scene.camera(view).t, atol=1e-9)
     assert skep.Scene.read(tmp_path, (1.0, 8.0)).depth_range(3) == (1.0, 8.0)
+    seen = []
+    skep.Scene.read(tmp_path, progress=seen.append)
+    assert seen[-1].done == 1.0 and {progress.phase for progress in seen} == {skep.Phase.READ}
+    with pytest.raises(skep.Cancelled):
+        skep.Scene.read(tmp_path, progress=lambda progress: skep.CANCEL)
 
 
 def test_a_workspace_holds_the_maps_and_the_cloud(tmp_path, result, scene):

@@ -30,12 +30,16 @@ class Scene : public detail::Handle<skep_scene, skep_scene_destroy> {
         return detail::give(skep_scene_copy(get(), scene.put()), scene);
     }
     /// A scene of any format that skep_scene_read reads; (0, 0) takes the depth ranges from it. Of the
-    /// options input.*, threads and memory count.
+    /// options input.*, threads and memory count; `progress` is told of the photographs that are read.
     static Fallible<Scene> read(const std::string &path, DepthRange range = {},
-                                const skep_options *options = nullptr) {
+                                const skep_options *options = nullptr,
+                                const ProgressCallback &progress = {}) {
         Scene scene(nullptr);
-        return detail::give(
-            skep_scene_read(path.c_str(), options, range.near_depth, range.far_depth, scene.put()), scene);
+        return detail::give(progress.run([&](skep_progress_fn callback, void *user) {
+            return skep_scene_read(path.c_str(), options, range.near_depth, range.far_depth, callback, user,
+                                   scene.put());
+        }),
+                            scene);
     }
     Fallible<void> write_colmap(const std::string &folder) const {
         return detail::give(skep_scene_write_colmap(get(), folder.c_str()));

@@ -5,6 +5,7 @@ use super::image::check_size;
 use super::maps;
 use super::options::{options_or_default, skep_options};
 use super::pointers::{self, get, give_list, out, path, slice, wanted};
+use super::progress::{Host, skep_progress_fn};
 use super::result::skep_result;
 use super::scene::skep_scene;
 use super::status::{Failure, guard, skep_status};
@@ -14,7 +15,7 @@ use crate::import;
 use crate::io::{self, Workspace};
 use crate::memory::require_memory;
 use crate::scene::View;
-use std::ffi::c_char;
+use std::ffi::{c_char, c_void};
 use std::path::Path;
 
 /// Reads a scene of any format that skep_job_plan reads: a COLMAP workspace or model with any lens, text or
@@ -27,6 +28,8 @@ use std::path::Path;
 /// @param near             Smallest depth of every view in world units; 0 with `far` 0 derives the ranges
 ///                         from the scene.
 /// @param far              Largest depth of every view in world units.
+/// @param progress_or_null  Receives the progress of reading the photographs and may cancel; NULL: none.
+/// @param user             Passed to the callback; may be NULL.
 /// @param scene_out        Receives the scene; destroy it with skep_scene_destroy. skep_scene_get_warning
 ///                         tells what was found out while it was read.
 /// @retval SKEP_ERR_ARGUMENT  Not 0 < near < far, a choice that fits no photograph, or a scene that
@@ -34,12 +37,15 @@ use std::path::Path;
 /// @retval SKEP_ERR_FILE      A file that is missing or cannot be used; the text names the file, the line
 ///                            where there is one, and what was expected.
 /// @retval SKEP_ERR_MEMORY    Photographs that do not fit.
+/// @retval SKEP_ERR_CANCELLED  The callback returned non-zero.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn skep_scene_read(
     path: *const c_char,
     options_or_null: *const skep_options,
     near: f64,
     far: f64,
+    progress_or_null: skep_progress_fn,
+    user: *mut c_void,
     scene_out: *mut *mut skep_scene,
 ) -> skep_status {
     guard(|| {
@@ -55,7 +61,9 @@ pub unsafe extern "C" fn skep_scene_read(
         if let Some(range) = range {
             range.check("depth range")?;
         }
-        out.give(skep_scene::new(import::read_scene(path, range, &options)?));
+        let host = Host::new(progress_or_null, user);
+        let scene = import::read_scene(path, range, &options, &|at| host.tell(at))?;
+        out.give(skep_scene::new(scene));
         Ok(())
     })
 }

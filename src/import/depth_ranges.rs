@@ -3,7 +3,7 @@
 use super::SourceScene;
 use crate::error::{Error, Result};
 use crate::geometry::DepthRange;
-use crate::io::cannot_be_read;
+use crate::io::read_text;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use std::path::Path;
 /// A file that cannot be read; a line that is not of that form; a name that the scene does not have, or that
 /// the file has twice; a range that is not 0 < near < far.
 pub(super) fn read_depth_ranges(scene: &mut SourceScene, path: &Path) -> Result<()> {
-    let text = std::fs::read_to_string(path).map_err(|error| cannot_be_read(path, error))?;
+    let text = read_text(path)?;
     let mut ranges: HashMap<&str, DepthRange> = HashMap::new();
     let names: HashMap<String, usize> =
         (0..).zip(&scene.photographs).map(|(index, photograph)| (photograph.name.clone(), index)).collect();

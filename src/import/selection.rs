@@ -4,7 +4,7 @@ use super::{SourcePhotograph, SourceScene};
 use crate::error::{Error, Result};
 use crate::geometry::Camera;
 use crate::image::{Photograph, Picture, PictureSource};
-use crate::io::cannot_be_read;
+use crate::io::read_text;
 use crate::options::Options;
 use crate::scene::{Scene, View};
 use crate::view_selection::source_lists;
@@ -130,7 +130,7 @@ impl PictureSource for NoPixels {
 fn entries(chosen: &str) -> Result<Vec<String>> {
     let path = Path::new(chosen.trim());
     let list = match path.is_file() {
-        true => std::fs::read_to_string(path).map_err(|error| cannot_be_read(path, error))?,
+        true => read_text(path)?,
         false => chosen.replace(',', "\n"),
     };
     let lines = list.lines().map(str::trim);

@@ -2,7 +2,7 @@
 
 use super::SourceScene;
 use crate::error::{Error, Result};
-use crate::io::cannot_be_read;
+use crate::io::read_text;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use std::path::Path;
 /// # Errors
 /// A file that cannot be read; a name that the scene does not have; a photograph that is its own source.
 pub(super) fn read_source_lists(scene: &mut SourceScene, path: &Path) -> Result<()> {
-    let text = std::fs::read_to_string(path).map_err(|error| cannot_be_read(path, error))?;
+    let text = read_text(path)?;
     let indices: HashMap<String, u32> = (0u32..)
         .zip(&scene.photographs)
         .map(|(index, photograph)| (photograph.name.clone(), index))

@@ -147,7 +147,7 @@ fn a_distorted_scene_is_read_into_memory_undistorted_reduced_and_chosen() {
     let mut options = skep::Options::default();
     options.set("input.max_image_size", "100").unwrap();
     options.set("input.images", &NAMES[..3].join(",")).unwrap();
-    let read = skep::import::read_scene(scene.path(), None, &options).unwrap();
+    let read = skep::import::read_scene(scene.path(), None, &options, &skep::ignore_progress).unwrap();
     assert_eq!(read.views().len(), 3);
     let view = &read.views()[0];
     assert_eq!(view.camera.width.max(view.camera.height), 100);

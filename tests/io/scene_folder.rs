@@ -21,7 +21,7 @@ pub fn write_pictures(folder: &Path, model: &ColmapModel) {
 
 /// Reads a scene with the default options.
 fn read_scene(folder: &Path, depth_range: Option<DepthRange>) -> Result<Scene> {
-    import::read_scene(folder, depth_range, &Options::default())
+    import::read_scene(folder, depth_range, &Options::default(), &skep::ignore_progress)
 }
 
 const RANGE: Option<DepthRange> = Some(DepthRange { near: 1.0, far: 9.0 });

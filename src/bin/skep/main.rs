@@ -21,7 +21,6 @@ mod server;
 mod stopwatch;
 mod streams;
 mod tasks;
-mod text_file;
 mod time_left;
 mod view;
 

@@ -1,6 +1,5 @@
 //! Options from a file: `--options`.
 
-use crate::text_file;
 use serde_json::{Map, Value};
 use skep::{Error, Options, Result};
 use std::path::Path;
@@ -13,7 +12,7 @@ const OF_MACHINE: [&str; 3] = ["threads", "memory", "simd"];
 /// # Errors
 /// A file that cannot be read or is no such object; an option that does not exist or has no such value.
 pub fn apply(file: &Path, options: &mut Options) -> Result<()> {
-    let text = text_file::read(file)?;
+    let text = skep::io::read_text(file)?;
     let found = parse(&text).map_err(|error| Error::file(file, error))?;
     for (name, value) in found.iter().filter(|(name, _)| !OF_MACHINE.contains(&name.as_str())) {
         let set = match value {

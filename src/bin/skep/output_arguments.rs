@@ -1,6 +1,5 @@
 //! The arguments on what a command writes.
 
-use crate::text_file;
 use clap::{Args, ValueEnum};
 use skep::{CloudFormat, Error, Options, Result, ViewFiles};
 use std::path::{Path, PathBuf};
@@ -36,7 +35,7 @@ impl BoundsArguments {
             options.set(NAME, &text.join(" "))?;
         }
         if let Some(file) = &self.bounds_file {
-            let text = text_file::read(file)?;
+            let text = skep::io::read_text(file)?;
             let lines: Vec<&str> = text.lines().filter(|line| !line.trim_start().starts_with('#')).collect();
             let numbers = lines.join(" ");
             if numbers.trim().is_empty() {

@@ -28,6 +28,7 @@ from ._images import Order, image as to_image
 from ._native import ffi, lib
 from ._objects import NotPickled
 from ._options import Options
+from ._run import ProgressFunction, run
 
 
 class Scene(NotPickled):
@@ -53,16 +54,23 @@ class Scene(NotPickled):
         path: str | os.PathLike[str],
         depth_range: tuple[float, float] | None = None,
         options: Options | None = None,
+        progress: ProgressFunction | None = None,
     ) -> Scene:
         """Reads a scene of any format into memory: COLMAP, nerfstudio, OpenMVS, MVSNet, OpenSfM, Middlebury.
 
         `depth_range` is that of every view; None derives it from the scene. Photographs are undistorted; the
-        options `input.*` choose, reduce and mask them. `warnings` has what was found out.
+        options `input.*` choose, reduce and mask them. `warnings` has what was found out. `progress` is told of the
+        photographs that are read, as in `reconstruct`.
         """
         near, far = depth_range or (0.0, 0.0)
-        out = ffi.new("skep_scene **")
-        check(lib.skep_scene_read(to_path(path, "path"), _options.handle(options), near, far, out))
-        return cls._of(out)
+        place, chosen = to_path(path, "path"), _options.handle(options)
+
+        def call(callback: Any, user: Any, out: Any) -> int:
+            return lib.skep_scene_read(place, chosen, near, far, callback, user, out)
+
+        scene = cls.__new__(cls)
+        scene._handle = run(call, "skep_scene", progress)
+        return scene
 
     @classmethod
     def _of(cls, out: Any) -> Scene:

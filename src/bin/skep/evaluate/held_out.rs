@@ -150,7 +150,7 @@ pub fn score(
     let Some(colors) = &points.colors else {
         return Err(Error::file(cloud, "the points have no colors; expected red, green, blue of 8 bits"));
     };
-    let views = read_views(scene, options, left_out)?;
+    let views = read_views(work, scene, options, left_out)?;
     let views = work.map("photographs compared", &views, |view| {
         let photograph: Picture = view.picture.load()?;
         let rendering = Rendering::new(&view.camera, &points.positions, colors);
@@ -175,7 +175,7 @@ pub fn score(
 }
 
 /// The photographs of these names, without distortion and of the size that the options say.
-fn read_views(scene: &Path, options: &Options, left_out: &[String]) -> Result<Vec<View>> {
+fn read_views(work: &Work, scene: &Path, options: &Options, left_out: &[String]) -> Result<Vec<View>> {
     let names = names(scene)?;
     if let Some(unknown) = left_out.iter().find(|name| !names.contains(name)) {
         let expected = format!("names of photographs of the scene, such as {}", names[0]);
@@ -194,7 +194,7 @@ fn read_views(scene: &Path, options: &Options, left_out: &[String]) -> Result<Ve
     reading.input.images = list.path().to_string_lossy().into_owned();
     // No depth is asked for, and some scenes have no points to derive one from.
     let range = Some(DepthRange { near: 1.0, far: 2.0 });
-    let scene = import::read_scene(scene, range, &reading)?;
+    let scene = import::read_scene(scene, range, &reading, &|_| work.control_flow())?;
     Ok(scene.views().iter().filter(|view| left_out.contains(&view.name)).cloned().collect())
 }
 

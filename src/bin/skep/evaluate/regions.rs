@@ -1,7 +1,6 @@
 //! Which points count: alignment, boxes and polygons.
 
 use super::arguments::RegionArguments;
-use crate::text_file;
 use glam::{DMat4, DVec3};
 use serde::Deserialize;
 use skep::{Error, Result};
@@ -64,7 +63,7 @@ fn corners(numbers: &[f64]) -> Result<(DVec3, DVec3)> {
 
 /// A matrix of four rows; lines that begin with `#` do not count.
 fn read_matrix(path: &Path) -> Result<DMat4> {
-    let text = text_file::read(path)?;
+    let text = skep::io::read_text(path)?;
     let words =
         text.lines().filter(|line| !line.trim_start().starts_with('#')).flat_map(str::split_whitespace);
     let numbers: Option<Vec<f64>> = words.map(|word| word.parse().ok()).collect();
@@ -79,7 +78,7 @@ fn read_matrix(path: &Path) -> Result<DMat4> {
 }
 
 fn read_volume(path: &Path) -> Result<Volume> {
-    let volume: Volume = serde_json::from_str(&text_file::read(path)?)
+    let volume: Volume = serde_json::from_str(&skep::io::read_text(path)?)
         .map_err(|error| Error::file(path, format!("{error}; expected a selection volume of Open3D")))?;
     if !["X", "Y", "Z"].contains(&volume.orthogonal_axis.as_str()) {
         let problem = format!("orthogonal_axis is {:?}; expected X, Y or Z", volume.orthogonal_axis);

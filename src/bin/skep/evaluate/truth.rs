@@ -1,7 +1,6 @@
 //! Folders of true depth and normal maps.
 
 use super::float_maps::{read_npy, read_pfm};
-use crate::text_file;
 use image::DynamicImage;
 use skep::io::{Grid, read_depth_map, read_normal_map};
 use skep::{Error, Result};
@@ -143,7 +142,7 @@ fn single(map: Grid<[f32; 1]>) -> Grid<f32> {
 }
 
 fn scale_of(file: &Path) -> Result<f64> {
-    let text = text_file::read(file)?;
+    let text = skep::io::read_text(file)?;
     let json: serde_json::Value = serde_json::from_str(&text).map_err(|error| Error::file(file, error))?;
     let scale = json["depth_scale"].as_f64().filter(|scale| *scale > 0.0);
     scale.ok_or_else(|| {

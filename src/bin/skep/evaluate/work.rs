@@ -5,6 +5,7 @@ use crate::progress::Display;
 use crate::time_left::{TimeLeft, clock};
 use rayon::prelude::*;
 use skep::{Error, Result};
+use std::ops::ControlFlow;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -37,9 +38,14 @@ impl<'a> Work<'a> {
         self.display.print(line);
     }
 
+    /// Whether the user wants to go on.
+    pub fn control_flow(&self) -> ControlFlow<()> {
+        self.interrupt.control_flow()
+    }
+
     /// Returns an error when the user asked to stop.
     pub fn check(&self) -> Result<()> {
-        if self.interrupt.control_flow().is_break() { Err(Error::Cancelled) } else { Ok(()) }
+        if self.control_flow().is_break() { Err(Error::Cancelled) } else { Ok(()) }
     }
 
     /// Does something with all threads.
