@@ -122,11 +122,35 @@ fn info_prints_version_machine_and_every_option_of_the_presets() {
     for (name, value) in
         [skep::Options::default(), skep::Options::paper()].iter().flat_map(skep::Options::values)
     {
-        let row = printed.lines().find(|line| line.split_whitespace().next() == Some(name));
-        let row = row.unwrap_or_else(|| panic!("no row for {name}:\n{printed}"));
+        // Long values are on lines of their own below the name.
+        let is_named = |line: &&str| line.split_whitespace().next() == Some(name);
+        let rows: Vec<&str> = printed
+            .lines()
+            .skip_while(|line| !is_named(line))
+            .enumerate()
+            .take_while(|(place, line)| *place == 0 || line.starts_with(' '))
+            .flat_map(|(_, line)| line.split_whitespace())
+            .collect();
+        assert!(!rows.is_empty(), "no row for {name}:\n{printed}");
         let value = value.to_string();
-        let first_part = value.split("; ").next().unwrap();
-        assert!(row.contains(first_part), "{row} lacks {first_part}");
+        let words: Vec<&str> = value.split_whitespace().collect();
+        assert!(words.is_empty() || rows.windows(words.len()).any(|part| part == words), "{name}: {value}");
+    }
+}
+
+#[test]
+fn what_is_said_of_options_fits_80_columns() {
+    let every_name: Vec<&str> = skep::Options::infos().map(|info| info.name).collect();
+    let groups = skep::Options::groups().map(|(name, _)| name);
+    for arguments in [&["info"][..]]
+        .into_iter()
+        .map(<[&str]>::to_vec)
+        .chain(every_name.into_iter().chain(groups).map(|name| vec!["info", name]))
+    {
+        let output = skep(&arguments);
+        assert!(output.status.success());
+        let long = text(&output.stdout).lines().find(|line| line.chars().count() > 80);
+        assert_eq!(long, None, "{arguments:?}");
     }
 }
 
