@@ -157,6 +157,11 @@ fn range(text: &str) -> std::result::Result<Range<usize>, String> {
 /// `NAME=VALUE`.
 pub fn setting(text: &str) -> std::result::Result<(String, String), String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE, such as smoothness_reward=0.1")?;
+    if name.trim() == "preset" {
+        return Err(
+            "a preset is no option; `--preset NAME` of reconstruct and plan starts from one".to_owned()
+        );
+    }
     Ok((name.trim().to_owned(), value.trim().to_owned()))
 }
 

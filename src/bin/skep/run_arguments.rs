@@ -21,7 +21,8 @@ pub struct Run {
     #[arg(long, default_value = "default", value_parser = Options::PRESETS)]
     pub preset: String,
     /// Start from the options in FILE instead of a preset: a report.json, for the options of its run, or an
-    /// object with options by name. Threads, memory and the instruction set are not taken
+    /// object with options by name and, as `preset`, the preset that they change. Threads, memory and the
+    /// instruction set are not taken
     #[arg(long, value_name = "FILE", conflicts_with = "preset")]
     options: Option<PathBuf>,
     /// Worker threads at most; 0 uses one for each core. At most four for each core are started, and no more
