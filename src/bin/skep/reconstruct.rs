@@ -207,7 +207,7 @@ fn misplaced(job: &Job, range: DepthRange) -> Option<String> {
 
 /// What the run needs, in a line.
 fn needs(job: &Job) -> String {
-    let Needs { least_memory, memory, disk, cpu_seconds } = job.needs();
+    let Needs { least_memory, expected_memory, memory, disk, cpu_seconds } = job.needs();
     let threads = skep::thread_count(job.scene(), job.options());
     let seconds = cpu_seconds / threads as f64;
     let time = match seconds {
@@ -216,9 +216,11 @@ fn needs(job: &Job) -> String {
         _ => format!("{:.1} h", seconds / 3600.0),
     };
     format!(
-        "{} views; about {time} on {threads} threads, at most {} of memory (it works with {}) and {} on disk",
+        "{} views; about {time} on {threads} threads, {} of memory (limit {}, --memory; it works with {}) and \
+         {} on disk",
         job.scene().views().len(),
         format_bytes(memory),
+        format_bytes(expected_memory),
         format_bytes(least_memory),
         format_bytes(disk)
     )
