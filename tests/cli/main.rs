@@ -186,7 +186,7 @@ fn help_names_files_and_remedies() {
 fn wrong_arguments_end_with_status_2_and_name_the_valid_values() {
     let scene = board();
     let scene = scene.to_str().unwrap();
-    let cases: [(&[&str], &str); 13] = [
+    let cases: [(&[&str], &str); 17] = [
         (&[], "Usage:"),
         (&["reconstruct"], "<SCENE>"),
         (&["reconstruct", scene, "--preset", "quick"], "default, fast, paper"),
@@ -206,6 +206,10 @@ fn wrong_arguments_end_with_status_2_and_name_the_valid_values() {
         (&["reconstruct", scene, "--depth-range", "NaN", "1"], "0 < near < far"),
         (&["reconstruct", scene, "--depth-range", "-1", "1"], "0 < near < far"),
         (&["reconstruct", scene, "--threads", "many"], "--threads"),
+        (&["reconstruct", scene, "--threads", "-1"], "invalid value '-1' for '--threads"),
+        (&["reconstruct", scene, "--memory", "-5GiB"], "memory is `-5GiB`; expected a number with a unit"),
+        (&["reconstruct", scene, "--min-confidence", "-1"], "fusion.min_confidence is -1; expected"),
+        (&["reconstruct", scene, "--set", "preset=fast"], "--preset"),
     ];
     for (arguments, expected) in cases {
         let (status, printed) = failure(arguments);

@@ -83,10 +83,10 @@ pub struct Plan {
 #[derive(Args)]
 pub struct Resources {
     /// Worker threads at most; 0 uses one for each core
-    #[arg(short, long, value_name = "N", default_value_t = 0)]
+    #[arg(short, long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     threads: usize,
     /// Memory to keep to, such as 8GiB [default: three quarters of what the machine allows]
-    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    #[arg(long, value_name = "SIZE", value_parser = bytes, allow_hyphen_values = true)]
     memory: Option<u64>,
 }
 
@@ -106,7 +106,7 @@ pub struct Views {
     #[command(flatten)]
     pub planned: Planned,
     /// The cycle, counted from 0; one that the run skips takes no time
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub cycle: usize,
     /// The views from A to before B, counted from 0 [default: all]
     #[arg(long, value_name = "A..B", value_parser = range)]
@@ -118,7 +118,7 @@ pub struct NextCycle {
     #[command(flatten)]
     pub planned: Planned,
     /// The cycle whose views are all checked
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub cycle: usize,
 }
 
@@ -225,7 +225,7 @@ pub struct Fuse {
     #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
     set: Vec<(String, String)>,
     /// Leave pixels of a smaller confidence, 0 to 1, out of the cloud; only maps of skep have confidences
-    #[arg(long, value_name = "C")]
+    #[arg(long, value_name = "C", allow_negative_numbers = true)]
     min_confidence: Option<f64>,
     /// Do not write the page report.html, where this is the last task of a run
     #[arg(long)]

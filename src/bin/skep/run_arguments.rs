@@ -27,10 +27,10 @@ pub struct Run {
     options: Option<PathBuf>,
     /// Worker threads at most; 0 uses one for each core. At most four for each core are started, and no more
     /// than the images keep busy. The result does not depend on it
-    #[arg(short, long, value_name = "N", default_value_t = 0)]
+    #[arg(short, long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     threads: usize,
     /// Seed of the random generator; the same seed gives the same result [default: 0]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     seed: Option<u64>,
     /// Depth range to search in every view, in units of the model, instead of that of the sparse points
     #[arg(long, num_args = 2, value_names = ["MIN", "MAX"], allow_negative_numbers = true)]
@@ -44,7 +44,7 @@ pub struct Run {
     #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
     set: Vec<(String, String)>,
     /// Leave pixels of a smaller confidence, 0 to 1, out of the cloud
-    #[arg(long, value_name = "C")]
+    #[arg(long, value_name = "C", allow_negative_numbers = true)]
     min_confidence: Option<f64>,
     /// Scales to search instead of the preset's, from coarse to fine, the last at full size, such as
     /// 'downscale=2 food_sources=3 iterations=5+4x1; downscale=1 food_sources=2 iterations=1+2x1': half size
@@ -53,7 +53,7 @@ pub struct Run {
     schedule: Option<String>,
     /// Memory to keep to, such as 8GiB; the result does not depend on it [default: three quarters of what
     /// the machine or its control group allows]
-    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    #[arg(long, value_name = "SIZE", value_parser = bytes, allow_hyphen_values = true)]
     memory: Option<u64>,
     #[command(flatten)]
     pub files: OutputArguments,
@@ -68,7 +68,7 @@ pub struct Run {
 #[derive(Args)]
 pub struct Input {
     /// Reduce photographs whose longer side has more pixels; the maps have the reduced size
-    #[arg(long, value_name = "PIXELS")]
+    #[arg(long, value_name = "PIXELS", allow_negative_numbers = true)]
     max_image_size: Option<u32>,
     /// Photographs to take: names or patterns with * and ?, separated by commas, or a file with one on each
     /// line
