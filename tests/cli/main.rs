@@ -219,13 +219,23 @@ fn wrong_arguments_end_with_status_2_and_name_the_valid_values() {
 }
 
 #[test]
-fn a_missing_scene_ends_with_status_1_and_its_name() {
-    let folder = TempDir::new().unwrap();
+fn a_file_that_an_argument_names_and_that_is_missing_ends_with_status_2_and_its_name() {
+    let (folder, board) = (TempDir::new().unwrap(), board());
     let scene = folder.path().join("nowhere");
-    for command in ["reconstruct", "fuse"] {
-        let (status, printed) = failure(&[command, scene.to_str().unwrap()]);
-        assert_eq!(status, Some(1), "{printed}");
-        assert!(printed.contains(scene.to_str().unwrap()), "{printed}");
+    let (scene_name, board) = (scene.to_str().unwrap(), board.to_str().unwrap());
+    for arguments in [
+        &["reconstruct", scene_name][..],
+        &["reconstruct", board, "-o", path(&folder), "--masks", scene_name],
+        &["reconstruct", board, "-o", path(&folder), "--options", scene_name],
+        &["fuse", scene_name],
+        &["search", scene_name, "--cycle", "0"],
+        &["view", scene_name],
+        &["convert", scene_name, "--to", "npy", "-o", path(&folder)],
+        &["evaluate", "--cloud", scene_name, "--truth-cloud", scene_name],
+    ] {
+        let (status, printed) = failure(arguments);
+        assert_eq!(status, Some(2), "{printed}");
+        assert_eq!(printed, format!("error: {scene_name}: no such file or folder\n"));
     }
     assert!(!scene.exists(), "nothing is created for a missing scene");
 }
@@ -254,7 +264,7 @@ fn an_output_that_cannot_be_written_is_detected_before_the_run() {
     fs::write(&occupied, "a file").unwrap();
     let (status, printed) = failure(&["reconstruct", path(&scene), "--output", occupied.to_str().unwrap()]);
     assert_eq!(status, Some(1));
-    assert!(printed.contains("occupied") && printed.contains("cannot be written"), "{printed}");
+    assert!(printed.contains("occupied: cannot be written: it is a file; expected a folder"), "{printed}");
     assert!(!printed.contains("search"), "{printed}");
 }
 

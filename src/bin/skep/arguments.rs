@@ -8,7 +8,7 @@ use crate::streams::LogLevel;
 use clap::{Args, Parser, Subcommand};
 use skep::{Error, Options, Result};
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Parser)]
 #[command(name = "skep", version, about, after_help = include_str!("help/main.txt"))]
@@ -56,6 +56,32 @@ pub enum Command {
     Completions(Completions),
     /// Write the manual pages of all commands
     Man(Man),
+}
+
+impl Command {
+    /// The files and folders that it reads and that must be there.
+    pub fn inputs(&self) -> Vec<&Path> {
+        match self {
+            Command::Reconstruct(Reconstruct { run, .. }) | Command::Plan(Plan { run, .. }) => run.inputs(),
+            Command::Search(Views { planned, .. })
+            | Command::Check(Views { planned, .. })
+            | Command::Next(NextCycle { planned, .. })
+            | Command::Finish(FinishViews { planned, .. }) => vec![&planned.folder],
+            Command::Fuse(Fuse { workspace, scene, options, .. }) => {
+                [Some(workspace), scene.as_ref(), options.as_ref()]
+                    .into_iter()
+                    .flatten()
+                    .map(PathBuf::as_path)
+                    .collect()
+            }
+            Command::View(View { folder, .. }) => vec![folder],
+            Command::Convert(Convert { workspace, scene, .. }) => {
+                [Some(workspace), scene.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect()
+            }
+            Command::Evaluate(evaluate) => evaluate.inputs(),
+            Command::Info(_) | Command::Completions(_) | Command::Man(_) => Vec::new(),
+        }
+    }
 }
 
 #[derive(Args)]

@@ -75,10 +75,12 @@ fn explain(info: &OptionInfo) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A line of a label and what it stands for.
+/// A label and what it stands for; the scales of a schedule are on lines of their own.
 fn labeled(label: &str, text: &str) -> String {
     let width = VALUE_INDENT - 3;
-    format!("  {label:<width$} {}", wrapped(text, VALUE_INDENT)).trim_end().to_owned()
+    let parts: Vec<String> = text.split_inclusive("; ").map(|part| wrapped(part, VALUE_INDENT)).collect();
+    let lines = parts.join(&format!("\n{}", " ".repeat(VALUE_INDENT)));
+    format!("  {label:<width$} {lines}").trim_end().to_owned()
 }
 
 /// A text in lines of [`WIDTH`] columns, of which all but the first are indented; the first one begins there,

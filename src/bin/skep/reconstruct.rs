@@ -136,6 +136,7 @@ pub fn plan(run: &Run, display: Display, interrupt: &Interrupt) -> std::result::
     let depth_range = run.depth_range().map_err(Failure::Usage)?;
     let options = run.options().map_err(Failure::Usage)?;
     options.check().map_err(Failure::Usage)?;
+    run.check_masks(&options).map_err(Failure::Usage)?;
     display.print(&format!("reading {}", run.scene.display()));
     let reporter = display.start();
     let progress = |progress: &Progress| {
@@ -219,8 +220,8 @@ fn needs(job: &Job) -> String {
         "{} views; about {time} on {threads} threads, {} of memory (limit {}, --memory; it works with {}) and \
          {} on disk",
         job.scene().views().len(),
-        format_bytes(memory),
         format_bytes(expected_memory),
+        format_bytes(memory),
         format_bytes(least_memory),
         format_bytes(disk)
     )

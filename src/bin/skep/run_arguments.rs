@@ -5,15 +5,15 @@ use crate::options_file;
 use crate::output_arguments::{BoundsArguments, OutputArguments};
 use crate::progress::Messages;
 use clap::{Args, ValueEnum};
-use skep::{DepthRange, Options, Result};
-use std::path::PathBuf;
+use skep::{DepthRange, Error, Options, Result};
+use std::path::{Path, PathBuf};
 
 #[derive(Args)]
 pub struct Run {
     /// Folder with images/ and a COLMAP model in sparse/ or sparse/0/, of any camera model; or a scene of
     /// another program (`skep help reconstruct` lists them)
     pub scene: PathBuf,
-    /// Folder of the results [default: SCENE/dense]
+    /// Folder of the results [default: SCENE/dense; of a scene that is a file, dense beside it]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Set of option values to start from: default has the best quality; fast takes less than half of its
@@ -123,7 +123,18 @@ enum Part {
 impl Run {
     /// The folder of the results.
     pub fn output(&self) -> PathBuf {
-        self.output.clone().unwrap_or_else(|| self.scene.join("dense"))
+        let beside = || match self.scene.is_file() {
+            true => self.scene.with_file_name("dense"),
+            false => self.scene.join("dense"),
+        };
+        self.output.clone().unwrap_or_else(beside)
+    }
+
+    /// Files and folders that must be there.
+    pub fn inputs(&self) -> Vec<&Path> {
+        let Input { masks, sources, depth_ranges, .. } = &self.input;
+        let named = [masks, sources, depth_ranges].into_iter().flatten().map(Path::new);
+        std::iter::once(self.scene.as_path()).chain(named).chain(self.options.as_deref()).collect()
     }
 
     /// The preset, as changed by the other arguments.
@@ -154,6 +165,31 @@ impl Run {
         }
         self.files.apply(&mut options)?;
         Ok(options)
+    }
+
+    /// Returns an error if the folder of the masks is that of the photographs and has no masks beside them:
+    /// photographs in PNG would be taken for masks, and others leave to guess what is wrong.
+    pub fn check_masks(&self, options: &Options) -> Result<()> {
+        let folder = options.input.masks.as_str();
+        let images = match self.scene.is_file() {
+            true => self.scene.with_file_name("images"),
+            false => self.scene.join("images"),
+        };
+        let is_same =
+            |other: &Path| matches!((images.canonicalize(), other.canonicalize()), (Ok(a), Ok(b)) if a == b);
+        let is_mask = |entry: std::fs::DirEntry| {
+            let name = entry.file_name();
+            name.to_str()
+                .and_then(|name| name.strip_suffix(".png"))
+                .is_some_and(|name| images.join(name).is_file())
+        };
+        let has_masks = || std::fs::read_dir(&images).is_ok_and(|entries| entries.flatten().any(is_mask));
+        if !folder.is_empty() && is_same(folder.as_ref()) && !has_masks() {
+            let expected = "a folder of masks, NAME.png for the photograph NAME; this one is that of the \
+                            photographs";
+            return Err(Error::argument("options.input.masks", folder, expected));
+        }
+        Ok(())
     }
 
     /// The depth range of `--depth-range`, checked.

@@ -4,7 +4,7 @@ use crate::arguments::Resources;
 use crate::progress::Messages;
 use clap::{Args, ValueEnum};
 use skep::io::MapKind;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Args)]
 pub struct Evaluate {
@@ -39,6 +39,17 @@ pub struct Evaluate {
     pub resources: Resources,
     #[command(flatten)]
     pub messages: Messages,
+}
+
+impl Evaluate {
+    /// The files and folders that it reads and that must be there.
+    pub fn inputs(&self) -> Vec<&Path> {
+        let Evaluate { path, cloud, truth, truth_cloud, maps, region, .. } = self;
+        let RegionArguments { transform, crop, dtu_mask, dtu_plane, .. } = region;
+        let of_maps = [path, truth, &maps.scene, &maps.truth_normals];
+        let of_clouds = [cloud, truth_cloud, transform, crop, dtu_mask, dtu_plane];
+        of_maps.into_iter().chain(of_clouds).flatten().map(PathBuf::as_path).collect()
+    }
 }
 
 /// How depth maps are compared.
