@@ -10,6 +10,7 @@ mod cloud;
 mod exposure;
 mod overlap;
 mod source;
+#[cfg(feature = "io")]
 mod streamed;
 mod thinning;
 
@@ -20,13 +21,16 @@ use crate::options::FusionOptions;
 use crate::parallel::{Phase, Progress, ProgressFn};
 use crate::scene::{Maps, PixelStatus};
 use average::{Member, average};
-pub(crate) use cloud::{CloudSource, Emit};
+#[cfg(feature = "io")]
+pub(crate) use cloud::CloudSource;
+pub(crate) use cloud::Emit;
 pub use cloud::{PointCloud, PointViews};
 use glam::{DVec2, DVec3};
 pub use overlap::overlaps;
 use rayon::prelude::*;
 use source::{Comparison, Source};
 use std::sync::atomic::{AtomicU64, Ordering};
+#[cfg(feature = "io")]
 pub(crate) use streamed::{LoadedView, StreamedViews, streamed_bytes};
 #[cfg(feature = "io")]
 pub(crate) use thinning::{draw, thin_by_voxels};

@@ -22,6 +22,7 @@ mod workspace_maps;
 
 pub(crate) use cloud::{CloudSpool, StoredCloud, visibility_path, write_cloud, write_splat};
 pub use cloud::{read_ply, read_visibility, write_ply, write_visibility};
+#[cfg(feature = "capi")]
 pub(crate) use colmap_maps::map_size;
 pub use colmap_maps::{
     ConsistencyGraph, Grid, read_consistency_graph, read_depth_map, read_normal_map, write_consistency_graph,

@@ -82,19 +82,34 @@ impl RunFolder {
         self.0.join("report.html")
     }
 
+    /// Returns an error if a file has the name of the folder, or of one above it.
+    fn check_is_folder(&self) -> Result<()> {
+        match self.0.ancestors().find(|path| path.exists()) {
+            Some(found) if !found.is_dir() && found == self.0 => {
+                Err(cannot_be_written(&self.0, "it is a file; expected a folder"))
+            }
+            Some(found) if !found.is_dir() => {
+                Err(cannot_be_written(&self.0, format!("{} is a file; expected a folder", found.display())))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Locks the run until the lock is dropped; the system unlocks it when the process ends.
     ///
     /// # Errors
     /// A folder that cannot be written; another process that works on the run.
     pub(super) fn lock(&self, access: Access) -> Result<Lock> {
         let path = self.0.join("run").join("lock");
+        self.check_is_folder()?;
+        // Of the folder: who reads the error has not heard of the file.
         let folders =
-            NewFolders::create(&self.0.join("run")).map_err(|error| cannot_be_written(&path, error))?;
+            NewFolders::create(&self.0.join("run")).map_err(|error| cannot_be_written(&self.0, error))?;
         loop {
             let is_new = !path.exists();
             // NFS gives a shared lock only on a file that is open for reading, an exclusive one for writing.
             let file = File::options().create(true).truncate(false).read(true).write(true).open(&path);
-            let file = file.map_err(|error| cannot_be_written(&path, error))?;
+            let file = file.map_err(|error| cannot_be_written(&self.0, error))?;
             let locked = match access {
                 Access::Whole => file.try_lock(),
                 Access::Tasks => file.try_lock_shared(),

@@ -44,6 +44,9 @@ const SECONDS_PER_UNIT: f64 = 1.9e-7;
 pub struct Needs {
     /// The least memory in bytes with which the run works.
     pub least_memory: u64,
+    /// The memory in bytes that the run is expected to take: more than [`Needs::least_memory`] where more
+    /// makes it faster, and no more than [`Needs::memory`].
+    pub expected_memory: u64,
     /// The memory in bytes that the run keeps to.
     pub memory: u64,
     /// Bytes on disk, at most at any time.
@@ -188,5 +191,10 @@ pub(super) fn needs(
     let disk =
         pixels * ESTIMATE_BYTES + written * (view_file_bytes(&options.output.write) + cloud_bytes(options));
     let least_memory = base + task.max(fusion);
-    (Needs { least_memory, memory, disk, cpu_seconds: work * SECONDS_PER_UNIT }, shares)
+    let of_views = tasks * task + (shares.images + shares.estimates) as u64;
+    // The fusion keeps finished views as long as there is room.
+    let of_fusion = fusion.max(written * FUSED_BYTES);
+    let expected_memory = (base + of_views.max(of_fusion)).min(memory);
+    let cpu_seconds = work * SECONDS_PER_UNIT;
+    (Needs { least_memory, expected_memory, memory, disk, cpu_seconds }, shares)
 }

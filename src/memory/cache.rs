@@ -57,6 +57,7 @@ impl<K: Eq + Hash + Copy, V> Cache<K, V> {
     }
 
     /// Forgets the values of some keys.
+    #[cfg(any(feature = "io", test))]
     pub(crate) fn forget(&self, is_obsolete: impl Fn(&K) -> bool) {
         let mut kept = self.kept();
         let obsolete: Vec<K> = kept.entries.keys().filter(|&key| is_obsolete(key)).copied().collect();

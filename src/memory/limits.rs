@@ -29,8 +29,10 @@ pub fn available_memory() -> Option<u64> {
 }
 
 /// Fraction of the available memory that is taken by default.
+#[cfg(feature = "io")]
 const DEFAULT_FRACTION: f64 = 0.75;
 /// Memory where the system does not tell how much there is.
+#[cfg(feature = "io")]
 const DEFAULT_MEMORY: u64 = 4 << 30;
 
 /// The bytes to keep to: those of the option `memory`, or a fraction of what is available where it is 0.

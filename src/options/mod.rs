@@ -252,9 +252,7 @@ impl Options {
         let found: Vec<OptionInfo> = Options::infos().filter(alone).collect();
         match found[..] {
             [only] => Ok(only),
-            [] => {
-                Err(Error::argument("option", name, format!("one of {}", names(similar(name).into_iter()))))
-            }
+            [] => Err(Error::argument("option", name, expected_instead_of(name))),
             _ => Err(Error::argument("option", name, format!("one of {}", names(found.into_iter())))),
         }
     }
@@ -360,7 +358,24 @@ fn info_range(max: u64) -> Kind {
     Kind::Count { min: 0, max }
 }
 
-/// The options that share most words with a name that does not exist; all, if none shares any.
+/// What is expected instead of a name that does not exist: one of the similar names or, where there are none,
+/// a group and where its options are listed.
+fn expected_instead_of(name: &str) -> String {
+    let similar = similar(name);
+    if !similar.is_empty() {
+        return format!("one of {}", names(similar.into_iter()));
+    }
+    let alone = Options::infos().filter(|info| !info.name.contains('.'));
+    let groups: Vec<&str> = Options::groups().map(|(group, _)| group).collect();
+    format!(
+        "{}, or an option of a group: {}; `skep info` lists all, `skep info {}` those of a group",
+        names(alone),
+        groups.join(", "),
+        groups[0]
+    )
+}
+
+/// The options that share most words with a name that does not exist; none, if none shares any.
 fn similar(name: &str) -> Vec<OptionInfo> {
     let words = |name: &str| -> Vec<String> {
         name.split(['.', '_', '-', ' ']).filter(|word| word.len() > 2).map(str::to_lowercase).collect()
@@ -371,7 +386,7 @@ fn similar(name: &str) -> Vec<OptionInfo> {
         wanted.iter().filter(|word| own.contains(word)).count()
     };
     let most = Options::infos().map(|info| shared(&info)).max().unwrap_or(0);
-    Options::infos().filter(|info| shared(info) == most).collect()
+    Options::infos().filter(|info| most > 0 && shared(info) == most).collect()
 }
 
 fn names(infos: impl Iterator<Item = OptionInfo>) -> String {

@@ -136,6 +136,7 @@ impl ViewFiles {
     };
 
     /// The maps that the fusion reads; of the validated pixels alone.
+    #[cfg(feature = "io")]
     pub(crate) const FUSED: ViewFiles =
         ViewFiles { status: false, graphs: false, previews: false, ..ViewFiles::ALL };
 

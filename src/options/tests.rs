@@ -37,7 +37,9 @@ fn a_unique_name_needs_no_group() {
     assert!(error.contains("check.depth_tolerance, fusion.depth_tolerance"), "{error}");
     let similar = Options::info("tolerance").unwrap_err().to_string();
     assert!(similar.contains("check.depth_tolerance") && !similar.contains("window_radius"), "{similar}");
-    assert!(Options::info("nonsense").unwrap_err().to_string().contains("window.window_radius"));
+    let unknown = Options::info("nonsense").unwrap_err().to_string();
+    assert!(unknown.contains("view_selection, ") && unknown.contains("`skep info`"), "{unknown}");
+    assert!(!unknown.contains("window_radius") && unknown.len() < 250, "{unknown}");
 }
 
 #[test]

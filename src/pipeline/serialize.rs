@@ -66,6 +66,7 @@ impl ViewEstimate<Checked> {
     }
 }
 
+#[cfg(feature = "io")]
 impl ViewEstimate<CheckedPlanes> {
     /// Writes the bytes of the published estimate's [`ViewEstimate::to_bytes`].
     pub(crate) fn write_to(&self, out: &mut dyn Write) -> io::Result<()> {

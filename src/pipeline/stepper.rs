@@ -267,6 +267,7 @@ impl Stepper {
         read
     }
 
+    #[cfg(feature = "io")]
     pub(super) fn context(&self) -> &RunContext {
         &self.0
     }

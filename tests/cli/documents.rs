@@ -8,7 +8,7 @@ fn a_group_or_a_part_of_a_name_lists_options() {
     let listed = |word: &str| text(&skep(&["info", word]).stdout).to_owned();
     let group = listed("fusion");
     assert!(group.starts_with("Fusion"), "{group}");
-    assert!(group.contains("\nfusion.depth_tolerance ") && !group.contains("check."), "{group}");
+    assert!(group.contains("\nfusion.depth_tolerance\n") && !group.contains("check."), "{group}");
     let part = listed("tolerance");
     assert!(part.contains("check.depth_tolerance") && part.contains("fusion.depth_tolerance"), "{part}");
 }

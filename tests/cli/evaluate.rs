@@ -160,7 +160,7 @@ fn wrong_truth_is_refused_with_its_name() {
     let scene = made_scene();
     let (dense, truth) = (words(&file(&scene, "dense")), words(&file(&scene, "gt")));
     let (status, printed) = refused(&[&dense, "--truth", &truth]);
-    assert!(status == Some(1) && printed.contains("dense"), "no workspace: {printed}");
+    assert!(status == Some(2) && printed.contains("dense"), "no workspace: {printed}");
     let map = file(&scene, "dense/stereo/depth_maps/a.png.geometric.bin");
     write_depth_map(&map, 5, 4, &[1.0; 20]).unwrap();
     let (status, printed) = refused(&[&dense, "--truth", &truth]);
@@ -174,7 +174,7 @@ fn wrong_truth_is_refused_with_its_name() {
     let (_, printed) = refused(&[&dense, "--truth", &truth]);
     assert!(printed.contains("a.png") && printed.contains("--depth-scale"), "{printed}");
     for (arguments, expected) in [
-        (["--truth", &words(&file(&scene, "nowhere"))], "--truth is"),
+        (["--truth", &words(&file(&scene, "nowhere"))], "nowhere: no such file or folder"),
         (["--thresholds", "0"], "--thresholds is 0"),
         (["--depth-scale", "NaN"], "--depth-scale is NaN"),
         (["--voxel", "0"], "--voxel is 0"),

@@ -122,11 +122,35 @@ fn info_prints_version_machine_and_every_option_of_the_presets() {
     for (name, value) in
         [skep::Options::default(), skep::Options::paper()].iter().flat_map(skep::Options::values)
     {
-        let row = printed.lines().find(|line| line.split_whitespace().next() == Some(name));
-        let row = row.unwrap_or_else(|| panic!("no row for {name}:\n{printed}"));
+        // Long values are on lines of their own below the name.
+        let is_named = |line: &&str| line.split_whitespace().next() == Some(name);
+        let rows: Vec<&str> = printed
+            .lines()
+            .skip_while(|line| !is_named(line))
+            .enumerate()
+            .take_while(|(place, line)| *place == 0 || line.starts_with(' '))
+            .flat_map(|(_, line)| line.split_whitespace())
+            .collect();
+        assert!(!rows.is_empty(), "no row for {name}:\n{printed}");
         let value = value.to_string();
-        let first_part = value.split("; ").next().unwrap();
-        assert!(row.contains(first_part), "{row} lacks {first_part}");
+        let words: Vec<&str> = value.split_whitespace().collect();
+        assert!(words.is_empty() || rows.windows(words.len()).any(|part| part == words), "{name}: {value}");
+    }
+}
+
+#[test]
+fn what_is_said_of_options_fits_80_columns() {
+    let every_name: Vec<&str> = skep::Options::infos().map(|info| info.name).collect();
+    let groups = skep::Options::groups().map(|(name, _)| name);
+    for arguments in [&["info"][..]]
+        .into_iter()
+        .map(<[&str]>::to_vec)
+        .chain(every_name.into_iter().chain(groups).map(|name| vec!["info", name]))
+    {
+        let output = skep(&arguments);
+        assert!(output.status.success());
+        let long = text(&output.stdout).lines().find(|line| line.chars().count() > 80);
+        assert_eq!(long, None, "{arguments:?}");
     }
 }
 
@@ -162,7 +186,7 @@ fn help_names_files_and_remedies() {
 fn wrong_arguments_end_with_status_2_and_name_the_valid_values() {
     let scene = board();
     let scene = scene.to_str().unwrap();
-    let cases: [(&[&str], &str); 13] = [
+    let cases: [(&[&str], &str); 17] = [
         (&[], "Usage:"),
         (&["reconstruct"], "<SCENE>"),
         (&["reconstruct", scene, "--preset", "quick"], "default, fast, paper"),
@@ -182,6 +206,10 @@ fn wrong_arguments_end_with_status_2_and_name_the_valid_values() {
         (&["reconstruct", scene, "--depth-range", "NaN", "1"], "0 < near < far"),
         (&["reconstruct", scene, "--depth-range", "-1", "1"], "0 < near < far"),
         (&["reconstruct", scene, "--threads", "many"], "--threads"),
+        (&["reconstruct", scene, "--threads", "-1"], "invalid value '-1' for '--threads"),
+        (&["reconstruct", scene, "--memory", "-5GiB"], "memory is `-5GiB`; expected a number with a unit"),
+        (&["reconstruct", scene, "--min-confidence", "-1"], "fusion.min_confidence is -1; expected"),
+        (&["reconstruct", scene, "--set", "preset=fast"], "--preset"),
     ];
     for (arguments, expected) in cases {
         let (status, printed) = failure(arguments);
@@ -191,13 +219,23 @@ fn wrong_arguments_end_with_status_2_and_name_the_valid_values() {
 }
 
 #[test]
-fn a_missing_scene_ends_with_status_1_and_its_name() {
-    let folder = TempDir::new().unwrap();
+fn a_file_that_an_argument_names_and_that_is_missing_ends_with_status_2_and_its_name() {
+    let (folder, board) = (TempDir::new().unwrap(), board());
     let scene = folder.path().join("nowhere");
-    for command in ["reconstruct", "fuse"] {
-        let (status, printed) = failure(&[command, scene.to_str().unwrap()]);
-        assert_eq!(status, Some(1), "{printed}");
-        assert!(printed.contains(scene.to_str().unwrap()), "{printed}");
+    let (scene_name, board) = (scene.to_str().unwrap(), board.to_str().unwrap());
+    for arguments in [
+        &["reconstruct", scene_name][..],
+        &["reconstruct", board, "-o", path(&folder), "--masks", scene_name],
+        &["reconstruct", board, "-o", path(&folder), "--options", scene_name],
+        &["fuse", scene_name],
+        &["search", scene_name, "--cycle", "0"],
+        &["view", scene_name],
+        &["convert", scene_name, "--to", "npy", "-o", path(&folder)],
+        &["evaluate", "--cloud", scene_name, "--truth-cloud", scene_name],
+    ] {
+        let (status, printed) = failure(arguments);
+        assert_eq!(status, Some(2), "{printed}");
+        assert_eq!(printed, format!("error: {scene_name}: no such file or folder\n"));
     }
     assert!(!scene.exists(), "nothing is created for a missing scene");
 }
@@ -226,7 +264,7 @@ fn an_output_that_cannot_be_written_is_detected_before_the_run() {
     fs::write(&occupied, "a file").unwrap();
     let (status, printed) = failure(&["reconstruct", path(&scene), "--output", occupied.to_str().unwrap()]);
     assert_eq!(status, Some(1));
-    assert!(printed.contains("occupied") && printed.contains("cannot be written"), "{printed}");
+    assert!(printed.contains("occupied: cannot be written: it is a file; expected a folder"), "{printed}");
     assert!(!printed.contains("search"), "{printed}");
 }
 

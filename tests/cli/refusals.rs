@@ -54,6 +54,33 @@ fn files_and_folders_in_the_way() {
 }
 
 #[test]
+fn photographs_in_place_of_masks() {
+    let scene = small_board();
+    let before = files(scene.path());
+    let images = scene.path().join("images/../images");
+    for argument in [["--masks", images.to_str().unwrap()], ["--set", "masks=images"]] {
+        let mut command = super::command(&["reconstruct", path(&scene), argument[0], argument[1]]);
+        let refused = command.current_dir(scene.path()).output().unwrap();
+        let printed = super::text(&refused.stderr);
+        assert_eq!(refused.status.code(), Some(2), "{printed}");
+        assert!(
+            printed.contains("input.masks is ") && printed.contains("that of the photographs"),
+            "{printed}"
+        );
+    }
+    assert_eq!(files(scene.path()), before);
+}
+
+#[test]
+fn a_scene_that_is_no_scene_but_a_file() {
+    let scene = small_board();
+    let photograph = scene.path().join("images").join(NAMES[0]);
+    let (status, printed) = failure(&["reconstruct", photograph.to_str().unwrap()]);
+    assert!(status == Some(1) && printed.contains("key.jpg: no scene; expected one of"), "{printed}");
+    assert!(!scene.path().join("images/dense").exists());
+}
+
+#[test]
 fn two_names_of_one_file() {
     for name in ["d//key.jpg", "d/./key.jpg", "./key.jpg", "d/key.jpg/"] {
         let scene = small_board();

@@ -8,7 +8,7 @@ use crate::streams::LogLevel;
 use clap::{Args, Parser, Subcommand};
 use skep::{Error, Options, Result};
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Parser)]
 #[command(name = "skep", version, about, after_help = include_str!("help/main.txt"))]
@@ -58,6 +58,32 @@ pub enum Command {
     Man(Man),
 }
 
+impl Command {
+    /// The files and folders that it reads and that must be there.
+    pub fn inputs(&self) -> Vec<&Path> {
+        match self {
+            Command::Reconstruct(Reconstruct { run, .. }) | Command::Plan(Plan { run, .. }) => run.inputs(),
+            Command::Search(Views { planned, .. })
+            | Command::Check(Views { planned, .. })
+            | Command::Next(NextCycle { planned, .. })
+            | Command::Finish(FinishViews { planned, .. }) => vec![&planned.folder],
+            Command::Fuse(Fuse { workspace, scene, options, .. }) => {
+                [Some(workspace), scene.as_ref(), options.as_ref()]
+                    .into_iter()
+                    .flatten()
+                    .map(PathBuf::as_path)
+                    .collect()
+            }
+            Command::View(View { folder, .. }) => vec![folder],
+            Command::Convert(Convert { workspace, scene, .. }) => {
+                [Some(workspace), scene.as_ref()].into_iter().flatten().map(PathBuf::as_path).collect()
+            }
+            Command::Evaluate(evaluate) => evaluate.inputs(),
+            Command::Info(_) | Command::Completions(_) | Command::Man(_) => Vec::new(),
+        }
+    }
+}
+
 #[derive(Args)]
 pub struct Reconstruct {
     #[command(flatten)]
@@ -83,10 +109,10 @@ pub struct Plan {
 #[derive(Args)]
 pub struct Resources {
     /// Worker threads at most; 0 uses one for each core
-    #[arg(short, long, value_name = "N", default_value_t = 0)]
+    #[arg(short, long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     threads: usize,
     /// Memory to keep to, such as 8GiB [default: three quarters of what the machine allows]
-    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    #[arg(long, value_name = "SIZE", value_parser = bytes, allow_hyphen_values = true)]
     memory: Option<u64>,
 }
 
@@ -106,7 +132,7 @@ pub struct Views {
     #[command(flatten)]
     pub planned: Planned,
     /// The cycle, counted from 0; one that the run skips takes no time
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub cycle: usize,
     /// The views from A to before B, counted from 0 [default: all]
     #[arg(long, value_name = "A..B", value_parser = range)]
@@ -118,7 +144,7 @@ pub struct NextCycle {
     #[command(flatten)]
     pub planned: Planned,
     /// The cycle whose views are all checked
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub cycle: usize,
 }
 
@@ -157,6 +183,11 @@ fn range(text: &str) -> std::result::Result<Range<usize>, String> {
 /// `NAME=VALUE`.
 pub fn setting(text: &str) -> std::result::Result<(String, String), String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE, such as smoothness_reward=0.1")?;
+    if name.trim() == "preset" {
+        return Err(
+            "a preset is no option; `--preset NAME` of reconstruct and plan starts from one".to_owned()
+        );
+    }
     Ok((name.trim().to_owned(), value.trim().to_owned()))
 }
 
@@ -220,7 +251,7 @@ pub struct Fuse {
     #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
     set: Vec<(String, String)>,
     /// Leave pixels of a smaller confidence, 0 to 1, out of the cloud; only maps of skep have confidences
-    #[arg(long, value_name = "C")]
+    #[arg(long, value_name = "C", allow_negative_numbers = true)]
     min_confidence: Option<f64>,
     /// Do not write the page report.html, where this is the last task of a run
     #[arg(long)]

@@ -28,16 +28,21 @@ use arguments::{Arguments, Command};
 use clap::Parser;
 use interrupt::Interrupt;
 use skep::Error;
+use std::path::Path;
 use std::process::ExitCode;
 
-/// Exit status: failed for a reason that was printed.
+/// Exit status: failed for a reason that was printed, as what the arguments name holds or cannot be written.
 const FAILED: u8 = 1;
-/// Exit status: wrong arguments; the same as clap's.
+/// Exit status: wrong arguments, also a file that they name and that does not exist; the same as clap's.
 const USAGE: u8 = 2;
 
 fn main() -> ExitCode {
     let Arguments { command, log_level } = Arguments::parse();
     streams::set_level(log_level);
+    let is_missing = |path: &&Path| matches!(path.try_exists(), Ok(false));
+    if let Some(path) = command.inputs().into_iter().find(is_missing) {
+        return fail(&Error::file(path, "no such file or folder"), USAGE);
+    }
     let interrupt = Interrupt::watch();
     let result = match command {
         Command::Reconstruct(arguments) => reconstruct::run(&arguments, &interrupt),

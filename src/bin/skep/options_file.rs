@@ -7,13 +7,23 @@ use std::path::Path;
 /// Options of the machine, which do not change the result.
 const OF_MACHINE: [&str; 3] = ["threads", "memory", "simd"];
 
-/// Sets the options in a file: those of the run that wrote a `report.json`, or the members of an object.
+/// The member that names the preset to start from.
+const PRESET: &str = "preset";
+
+/// Sets the options in a file: those of the run that wrote a `report.json`, or the members of an object. Its
+/// member `preset` names the preset to start from.
 ///
 /// # Errors
-/// A file that cannot be read or is no such object; an option that does not exist or has no such value.
+/// A file that cannot be read or is no such object; a preset or an option that does not exist, or that has no
+/// such value.
 pub fn apply(file: &Path, options: &mut Options) -> Result<()> {
     let text = skep::io::read_text(file)?;
-    let found = parse(&text).map_err(|error| Error::file(file, error))?;
+    let mut found = parse(&text).map_err(|error| Error::file(file, error))?;
+    if let Some(preset) = found.remove(PRESET) {
+        let name = preset.as_str().map_or_else(|| preset.to_string(), str::to_owned);
+        let preset = Options::preset(&name).map_err(|error| Error::file(file, error.to_string()))?;
+        *options = Options { threads: options.threads, memory: options.memory, ..preset };
+    }
     for (name, value) in found.iter().filter(|(name, _)| !OF_MACHINE.contains(&name.as_str())) {
         let set = match value {
             Value::String(text) => options.set(name, text),
@@ -72,6 +82,17 @@ mod tests {
             applied(r#"{"threads": 3, "fusion.min_agreeing_views": 2, "refine.fill_gaps": false}"#).unwrap();
         assert_eq!((options.threads, options.fusion.min_agreeing_views), (0, 2));
         assert!(!options.refine.fill_gaps);
+    }
+
+    #[test]
+    fn an_object_names_the_preset_that_its_options_change() {
+        let mut expected = Options::preset("fast").unwrap();
+        expected.refine.fill_gaps = false;
+        assert_eq!(applied(r#"{"refine.fill_gaps": false, "preset": "fast"}"#), Ok(expected));
+        for preset in [r#""quick""#, "3"] {
+            let error = applied(&format!(r#"{{"preset": {preset}}}"#)).unwrap_err();
+            assert!(error.contains("options.json: preset is") && error.contains("fast, paper"), "{error}");
+        }
     }
 
     #[test]

@@ -55,7 +55,7 @@ pub struct CloudArguments {
     #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
     voxel: Option<f64>,
     /// Thin the cloud to N points at most, drawn at random
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     max_points: Option<u32>,
     /// Format of the cloud: ply, las or laz [default: ply]
     #[arg(long, value_name = "FORMAT", value_parser = CloudFormat::from_name)]

@@ -136,6 +136,7 @@ pub fn plan(run: &Run, display: Display, interrupt: &Interrupt) -> std::result::
     let depth_range = run.depth_range().map_err(Failure::Usage)?;
     let options = run.options().map_err(Failure::Usage)?;
     options.check().map_err(Failure::Usage)?;
+    run.check_masks(&options).map_err(Failure::Usage)?;
     display.print(&format!("reading {}", run.scene.display()));
     let reporter = display.start();
     let progress = |progress: &Progress| {
@@ -207,7 +208,7 @@ fn misplaced(job: &Job, range: DepthRange) -> Option<String> {
 
 /// What the run needs, in a line.
 fn needs(job: &Job) -> String {
-    let Needs { least_memory, memory, disk, cpu_seconds } = job.needs();
+    let Needs { least_memory, expected_memory, memory, disk, cpu_seconds } = job.needs();
     let threads = skep::thread_count(job.scene(), job.options());
     let seconds = cpu_seconds / threads as f64;
     let time = match seconds {
@@ -216,8 +217,10 @@ fn needs(job: &Job) -> String {
         _ => format!("{:.1} h", seconds / 3600.0),
     };
     format!(
-        "{} views; about {time} on {threads} threads, at most {} of memory (it works with {}) and {} on disk",
+        "{} views; about {time} on {threads} threads, {} of memory (limit {}, --memory; it works with {}) and \
+         {} on disk",
         job.scene().views().len(),
+        format_bytes(expected_memory),
         format_bytes(memory),
         format_bytes(least_memory),
         format_bytes(disk)

@@ -5,15 +5,15 @@ use crate::options_file;
 use crate::output_arguments::{BoundsArguments, OutputArguments};
 use crate::progress::Messages;
 use clap::{Args, ValueEnum};
-use skep::{DepthRange, Options, Result};
-use std::path::PathBuf;
+use skep::{DepthRange, Error, Options, Result};
+use std::path::{Path, PathBuf};
 
 #[derive(Args)]
 pub struct Run {
     /// Folder with images/ and a COLMAP model in sparse/ or sparse/0/, of any camera model; or a scene of
     /// another program (`skep help reconstruct` lists them)
     pub scene: PathBuf,
-    /// Folder of the results [default: SCENE/dense]
+    /// Folder of the results [default: SCENE/dense; of a scene that is a file, dense beside it]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Set of option values to start from: default has the best quality; fast takes less than half of its
@@ -21,15 +21,16 @@ pub struct Run {
     #[arg(long, default_value = "default", value_parser = Options::PRESETS)]
     pub preset: String,
     /// Start from the options in FILE instead of a preset: a report.json, for the options of its run, or an
-    /// object with options by name. Threads, memory and the instruction set are not taken
+    /// object with options by name and, as `preset`, the preset that they change. Threads, memory and the
+    /// instruction set are not taken
     #[arg(long, value_name = "FILE", conflicts_with = "preset")]
     options: Option<PathBuf>,
     /// Worker threads at most; 0 uses one for each core. At most four for each core are started, and no more
     /// than the images keep busy. The result does not depend on it
-    #[arg(short, long, value_name = "N", default_value_t = 0)]
+    #[arg(short, long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     threads: usize,
     /// Seed of the random generator; the same seed gives the same result [default: 0]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     seed: Option<u64>,
     /// Depth range to search in every view, in units of the model, instead of that of the sparse points
     #[arg(long, num_args = 2, value_names = ["MIN", "MAX"], allow_negative_numbers = true)]
@@ -43,7 +44,7 @@ pub struct Run {
     #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
     set: Vec<(String, String)>,
     /// Leave pixels of a smaller confidence, 0 to 1, out of the cloud
-    #[arg(long, value_name = "C")]
+    #[arg(long, value_name = "C", allow_negative_numbers = true)]
     min_confidence: Option<f64>,
     /// Scales to search instead of the preset's, from coarse to fine, the last at full size, such as
     /// 'downscale=2 food_sources=3 iterations=5+4x1; downscale=1 food_sources=2 iterations=1+2x1': half size
@@ -52,7 +53,7 @@ pub struct Run {
     schedule: Option<String>,
     /// Memory to keep to, such as 8GiB; the result does not depend on it [default: three quarters of what
     /// the machine or its control group allows]
-    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    #[arg(long, value_name = "SIZE", value_parser = bytes, allow_hyphen_values = true)]
     memory: Option<u64>,
     #[command(flatten)]
     pub files: OutputArguments,
@@ -67,7 +68,7 @@ pub struct Run {
 #[derive(Args)]
 pub struct Input {
     /// Reduce photographs whose longer side has more pixels; the maps have the reduced size
-    #[arg(long, value_name = "PIXELS")]
+    #[arg(long, value_name = "PIXELS", allow_negative_numbers = true)]
     max_image_size: Option<u32>,
     /// Photographs to take: names or patterns with * and ?, separated by commas, or a file with one on each
     /// line
@@ -122,7 +123,18 @@ enum Part {
 impl Run {
     /// The folder of the results.
     pub fn output(&self) -> PathBuf {
-        self.output.clone().unwrap_or_else(|| self.scene.join("dense"))
+        let beside = || match self.scene.is_file() {
+            true => self.scene.with_file_name("dense"),
+            false => self.scene.join("dense"),
+        };
+        self.output.clone().unwrap_or_else(beside)
+    }
+
+    /// Files and folders that must be there.
+    pub fn inputs(&self) -> Vec<&Path> {
+        let Input { masks, sources, depth_ranges, .. } = &self.input;
+        let named = [masks, sources, depth_ranges].into_iter().flatten().map(Path::new);
+        std::iter::once(self.scene.as_path()).chain(named).chain(self.options.as_deref()).collect()
     }
 
     /// The preset, as changed by the other arguments.
@@ -153,6 +165,31 @@ impl Run {
         }
         self.files.apply(&mut options)?;
         Ok(options)
+    }
+
+    /// Returns an error if the folder of the masks is that of the photographs and has no masks beside them:
+    /// photographs in PNG would be taken for masks, and others leave to guess what is wrong.
+    pub fn check_masks(&self, options: &Options) -> Result<()> {
+        let folder = options.input.masks.as_str();
+        let images = match self.scene.is_file() {
+            true => self.scene.with_file_name("images"),
+            false => self.scene.join("images"),
+        };
+        let is_same =
+            |other: &Path| matches!((images.canonicalize(), other.canonicalize()), (Ok(a), Ok(b)) if a == b);
+        let is_mask = |entry: std::fs::DirEntry| {
+            let name = entry.file_name();
+            name.to_str()
+                .and_then(|name| name.strip_suffix(".png"))
+                .is_some_and(|name| images.join(name).is_file())
+        };
+        let has_masks = || std::fs::read_dir(&images).is_ok_and(|entries| entries.flatten().any(is_mask));
+        if !folder.is_empty() && is_same(folder.as_ref()) && !has_masks() {
+            let expected = "a folder of masks, NAME.png for the photograph NAME; this one is that of the \
+                            photographs";
+            return Err(Error::argument("options.input.masks", folder, expected));
+        }
+        Ok(())
     }
 
     /// The depth range of `--depth-range`, checked.

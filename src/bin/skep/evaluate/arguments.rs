@@ -4,7 +4,7 @@ use crate::arguments::Resources;
 use crate::progress::Messages;
 use clap::{Args, ValueEnum};
 use skep::io::MapKind;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Args)]
 pub struct Evaluate {
@@ -41,6 +41,17 @@ pub struct Evaluate {
     pub messages: Messages,
 }
 
+impl Evaluate {
+    /// The files and folders that it reads and that must be there.
+    pub fn inputs(&self) -> Vec<&Path> {
+        let Evaluate { path, cloud, truth, truth_cloud, maps, region, .. } = self;
+        let RegionArguments { transform, crop, dtu_mask, dtu_plane, .. } = region;
+        let of_maps = [path, truth, &maps.scene, &maps.truth_normals];
+        let of_clouds = [cloud, truth_cloud, transform, crop, dtu_mask, dtu_plane];
+        of_maps.into_iter().chain(of_clouds).flatten().map(PathBuf::as_path).collect()
+    }
+}
+
 /// How depth maps are compared.
 #[derive(Args)]
 #[command(next_help_heading = "Depth maps (--truth)")]
@@ -53,16 +64,22 @@ pub struct MapArguments {
     pub scene: Option<PathBuf>,
     /// Depth of the value 1 in true maps that are pictures of 8 or 16 bits [default: depth_scale of a
     /// scene.json in DIR or above it]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub depth_scale: Option<f64>,
     /// Folder of true normal maps [default: DIR/normal, or normal beside DIR]
     #[arg(long, value_name = "DIR")]
     pub truth_normals: Option<PathBuf>,
     /// Relative errors of the depth below which it is right
-    #[arg(long, value_name = "T,...", value_delimiter = ',', default_value = "0.001,0.002,0.005,0.01,0.02")]
+    #[arg(
+        long,
+        value_name = "T,...",
+        value_delimiter = ',',
+        default_value = "0.001,0.002,0.005,0.01,0.02",
+        allow_negative_numbers = true
+    )]
     pub thresholds: Vec<f64>,
     /// Views that must see a point of the true surface for the completeness of a cloud, with its own
-    #[arg(long, value_name = "N", default_value_t = 3)]
+    #[arg(long, value_name = "N", default_value_t = 3, allow_negative_numbers = true)]
     pub min_views: usize,
 }
 
@@ -71,19 +88,19 @@ pub struct MapArguments {
 #[command(next_help_heading = "Clouds (--cloud with --truth-cloud or --truth)")]
 pub struct DistanceArguments {
     /// Distances below which a point is right, in units of the clouds, for precision, recall and F
-    #[arg(long, value_name = "D,...", value_delimiter = ',')]
+    #[arg(long, value_name = "D,...", value_delimiter = ',', allow_negative_numbers = true)]
     pub distances: Vec<f64>,
     /// Largest distance for the means [default: none; with --dtu-mask 20]
-    #[arg(long, value_name = "D")]
+    #[arg(long, value_name = "D", allow_negative_numbers = true)]
     pub max_distance: Option<f64>,
     /// What becomes of larger distances in the means [default: clamp; with --dtu-mask drop]
     #[arg(long, value_name = "WHAT")]
     pub outliers: Option<Outliers>,
     /// Thin the cloud to this spacing before it is compared [default: none; with --dtu-mask 0.2]
-    #[arg(long, value_name = "SIZE")]
+    #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
     pub voxel: Option<f64>,
     /// Thin the true cloud or surface to this spacing [default: as --voxel; with --dtu-mask none]
-    #[arg(long, value_name = "SIZE")]
+    #[arg(long, value_name = "SIZE", allow_negative_numbers = true)]
     pub truth_voxel: Option<f64>,
     /// How clouds are thinned [default: mean; with --truth first, with --dtu-mask radius]
     #[arg(long, value_name = "HOW")]
@@ -120,7 +137,7 @@ pub struct HeldOutArguments {
     #[arg(long, value_name = "N", conflicts_with_all = ["truth", "truth_cloud", "cloud", "views"])]
     pub hold_out: Option<usize>,
     /// The first photograph that is left out, counted from 0
-    #[arg(long, value_name = "K", default_value_t = 0, requires = "hold_out")]
+    #[arg(long, value_name = "K", default_value_t = 0, requires = "hold_out", allow_negative_numbers = true)]
     pub first: usize,
     /// Folder of the reconstruction [default: SCENE/held-out]
     #[arg(short, long, value_name = "DIR", requires = "hold_out")]
