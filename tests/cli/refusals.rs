@@ -76,7 +76,7 @@ fn a_scene_that_is_no_scene_but_a_file() {
     let scene = small_board();
     let photograph = scene.path().join("images").join(NAMES[0]);
     let (status, printed) = failure(&["reconstruct", photograph.to_str().unwrap()]);
-    assert!(status == Some(1) && printed.contains("key.jpg: no scene; expected one of"), "{printed}");
+    assert!(status == Some(1) && printed.contains("key.jpg: photographs without cameras"), "{printed}");
     assert!(!scene.path().join("images/dense").exists());
 }
 

@@ -68,6 +68,9 @@ fn what_is_missing_is_named() {
         read_scene(folder.path(), None),
         &["no scene", "COLMAP model", "sparse/", "transforms.json"],
     );
+    let photographs = tempdir().unwrap();
+    std::fs::write(photographs.path().join("IMG_1.JPG"), "").unwrap();
+    assert_refused(read_scene(photographs.path(), None), &["photographs without cameras", "COLMAP finds"]);
     model().write_text(&folder.path().join("sparse")).unwrap();
     assert_refused(read_scene(folder.path(), None), &["images", "no such folder"]);
     write_pictures(folder.path(), &model());

@@ -73,6 +73,14 @@ const FORMATS: [Format; 6] = [
     },
 ];
 
+/// Whether a path is a photograph or a folder with some, in itself or in `images/`, by their names.
+fn holds_photographs(path: &Path) -> bool {
+    let is_photograph = |path: &Path| image::ImageFormat::from_path(path).is_ok();
+    let folders = [path.to_owned(), path.join("images")];
+    let mut entries = folders.iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten().flatten();
+    is_photograph(path) || entries.any(|entry| is_photograph(&entry.path()))
+}
+
 /// Reads the scene at a path, a folder or a file, whichever format it has.
 ///
 /// # Errors
@@ -84,7 +92,12 @@ pub fn read(path: &Path) -> Result<SourceScene> {
     }
     let Some(format) = FORMATS.iter().find(|format| (format.is_at)(path)) else {
         let looked_for = FORMATS.iter().map(|format| format.looked_for).collect::<Vec<_>>().join("; ");
-        return Err(Error::file(path, format!("no scene; expected one of: {looked_for}")));
+        let problem = match holds_photographs(path) {
+            true => "photographs without cameras: COLMAP finds these, as the README shows under \"From your \
+                     own photographs\"",
+            false => "no scene",
+        };
+        return Err(Error::file(path, format!("{problem}; expected one of: {looked_for}")));
     };
     let mut scene = (format.read)(path)?;
     if scene.photographs.is_empty() {
