@@ -359,16 +359,20 @@ size_t skep_last_error(char *buffer, size_t capacity);
  *       Failed attempts to improve a food source after which a scout bee may replace it.
  *       whole number, at least 0, attempts; default: 10
  *   search.employed_bees
- *       From the second cycle on, the number of food sources, best first, that employed bees perturb; 0 takes
- *       all.
- *       whole number, 0 to 64, food sources; default: 1, paper: 0
+ *       In the first cycle, the number of food sources, best first, that employed bees perturb; no colony has
+ *       more than 64.
+ *       whole number, 0 to 64, food sources; default: 1, paper: 64
+ *   search.later_employed_bees
+ *       The same from the second cycle on, where the food sources that a colony starts with are perturbations
+ *       already.
+ *       whole number, 0 to 64, food sources; default: 0, paper: 64
  *   search.onlooker_tournament_size
  *       Random neighbors of which an onlooker bee visits the one of lowest cost; different gray values raise
  *       the cost.
  *       whole number, 1 to 20, neighbors; default: 3, fast: 6, paper: 1
  *   search.local_plane_tolerance
- *       Relative inverse-depth error up to which a neighbor takes part in the local plane fit of each
- *       iteration; 0 fits no planes.
+ *       In the first cycle, relative inverse-depth error up to which a neighbor takes part in the local plane
+ *       fit of each iteration; 0 fits no planes.
  *       number, 0 to 1, fraction of the inverse depth; default: 0.02, fast: 0.03, paper: 0
  *   search.depth_perturbation
  *       From the second cycle on, half the range of inverse depths in which food sources start around a

@@ -77,17 +77,21 @@ fn best_of_tournament<S: Simd>(
     random: &mut Random,
 ) -> Option<Offset> {
     let mut best = random_neighbor(colonies, (x, y), random)?;
+    if tournament_size == 1 {
+        return Some(best);
+    }
     let cost = |(dx, dy): Offset| {
         let at = (x.wrapping_add_signed(dx as isize), y.wrapping_add_signed(dy as isize));
         let food = colonies.best(at);
         // A neighbor that is masked or was never evaluated has no plane.
         if food.depth > 0.0 { food.cost + 1.0 - evaluator.gray_similarity(at) } else { f32::INFINITY }
     };
+    let mut lowest = cost(best);
     for _ in 1..tournament_size {
-        if let Some(other) = random_neighbor(colonies, (x, y), random)
-            && cost(other) < cost(best)
-        {
-            best = other;
+        let Some(other) = random_neighbor(colonies, (x, y), random) else { continue };
+        let other_cost = cost(other);
+        if other_cost < lowest {
+            (best, lowest) = (other, other_cost);
         }
     }
     Some(best)

@@ -92,7 +92,10 @@ impl SearchRules {
         let search = &options.search;
         // The paper starts no set again: its cost is infinite then.
         let min_views = if options.cost.best_views == 0 { 0 } else { options.min_matched_views() };
-        let employed_bees = if is_guided { search.employed_bees as usize } else { 0 };
+        let (employed_bees, local_plane_tolerance) = match is_guided {
+            true => (search.later_employed_bees, 0.0),
+            false => (search.employed_bees, search.local_plane_tolerance as f32),
+        };
         let shrink = 0.5f64.powi(cycle_on_scale.min(64) as i32);
         SearchRules {
             cost: CostRules::new(options, is_guided),
@@ -100,12 +103,12 @@ impl SearchRules {
             food_sources: scale.food_sources as usize,
             iterations: if cycle_on_scale == 0 { scale.first_iterations } else { scale.cycle_iterations },
             trial_limit: search.trial_limit.min(u32::from(u16::MAX)) as u16,
-            employed_bees: if employed_bees == 0 { usize::MAX } else { employed_bees },
+            employed_bees: employed_bees as usize,
             onlookers: OnlookerRules {
                 reward: search.smoothness_reward as f32,
                 tournament_size: search.onlooker_tournament_size,
             },
-            local_plane_tolerance: search.local_plane_tolerance as f32,
+            local_plane_tolerance,
             max_views_per_pixel: options.cost.max_views_per_pixel as usize,
             perturbation: Perturbation {
                 depth: (search.depth_perturbation * shrink) as f32,

@@ -241,8 +241,9 @@ fn improve_colonies<S: Simd>(
                 employed::send(&mut evaluator, colony, rules.employed_bees, &mut random);
                 onlooker::send(&mut evaluator, colony, neighbors, at, rules.onlookers, &mut random);
                 evaluator.best_first(colony);
-                scout::send(&mut evaluator, colony, rules.trial_limit, &mut random);
-                evaluator.best_first(colony);
+                if scout::send(&mut evaluator, colony, rules.trial_limit, &mut random) {
+                    evaluator.best_first(colony);
+                }
             }
             evaluator.counts
         },

@@ -75,10 +75,13 @@ impl SmoothnessTerm {
     /// The cost of a food source's disagreement with the neighbors.
     #[inline(always)]
     pub(super) fn cost(&self, food: &FoodSource) -> f32 {
+        let SmoothnessRules { max_depth_error, max_normal_error, .. } = self.rules;
+        // Divisions of all neighbors together.
+        let (per_depth, per_normal) = (1.0 / (food.depth * max_depth_error), 1.0 / max_normal_error);
         let mut sum = 0.0;
         for prediction in &self.predictions[..self.count] {
-            let depth = (prediction.depth / food.depth - 1.0).abs() / self.rules.max_depth_error;
-            let normal = (1.0 - prediction.normal.dot(food.normal)) / self.rules.max_normal_error;
+            let depth = (prediction.depth - food.depth).abs() * per_depth;
+            let normal = (1.0 - prediction.normal.dot(food.normal)) * per_normal;
             let error = depth + normal;
             sum += prediction.weight * if error < 1.0 { error * error } else { 1.0 };
         }

@@ -152,14 +152,17 @@ options! {
     search: SearchOptions {
         /// Failed attempts to improve a food source after which a scout bee may replace it.
         trial_limit: count(0 to 4294967295) "attempts",
-        /// From the second cycle on, the number of food sources, best first, that employed bees perturb; 0
-        /// takes all.
+        /// In the first cycle, the number of food sources, best first, that employed bees perturb; no colony
+        /// has more than 64.
         employed_bees: count(0 to 64) "food sources",
+        /// The same from the second cycle on, where the food sources that a colony starts with are
+        /// perturbations already.
+        later_employed_bees: count(0 to 64) "food sources",
         /// Random neighbors of which an onlooker bee visits the one of lowest cost; different gray values
         /// raise the cost.
         onlooker_tournament_size: count(1 to 20) "neighbors",
-        /// Relative inverse-depth error up to which a neighbor takes part in the local plane fit of each
-        /// iteration; 0 fits no planes.
+        /// In the first cycle, relative inverse-depth error up to which a neighbor takes part in the local
+        /// plane fit of each iteration; 0 fits no planes.
         local_plane_tolerance: number(0.0 to 1.0) "fraction of the inverse depth",
         /// From the second cycle on, half the range of inverse depths in which food sources start around a
         /// validated estimate, halved each cycle of a scale; 0 starts them at random. Around an estimate that

@@ -59,7 +59,8 @@ impl Options {
             },
             search: SearchOptions {
                 trial_limit: 10,
-                employed_bees: 0,
+                employed_bees: 64,
+                later_employed_bees: 64,
                 onlooker_tournament_size: 1,
                 local_plane_tolerance: 0.0,
                 depth_perturbation: 0.0,
@@ -166,6 +167,7 @@ impl Default for Options {
             },
             search: SearchOptions {
                 employed_bees: 1,
+                later_employed_bees: 0,
                 onlooker_tournament_size: 3,
                 local_plane_tolerance: 0.02,
                 depth_perturbation: 0.01,

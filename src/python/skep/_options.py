@@ -149,15 +149,18 @@ class Options(Mapping[str, Value]):
     """Failed attempts to improve a food source after which a scout bee may replace it. (whole number, at
     least 0, attempts; default: 10)"""
     search_employed_bees: int
-    """From the second cycle on, the number of food sources, best first, that employed bees perturb; 0 takes
-    all. (whole number, 0 to 64, food sources; default: 1, paper: 0)"""
+    """In the first cycle, the number of food sources, best first, that employed bees perturb; no colony has
+    more than 64. (whole number, 0 to 64, food sources; default: 1, paper: 64)"""
+    search_later_employed_bees: int
+    """The same from the second cycle on, where the food sources that a colony starts with are perturbations
+    already. (whole number, 0 to 64, food sources; default: 0, paper: 64)"""
     search_onlooker_tournament_size: int
     """Random neighbors of which an onlooker bee visits the one of lowest cost; different gray values raise
     the cost. (whole number, 1 to 20, neighbors; default: 3, fast: 6, paper: 1)"""
     search_local_plane_tolerance: float
-    """Relative inverse-depth error up to which a neighbor takes part in the local plane fit of each
-    iteration; 0 fits no planes. (number, 0 to 1, fraction of the inverse depth; default: 0.02, fast: 0.03,
-    paper: 0)"""
+    """In the first cycle, relative inverse-depth error up to which a neighbor takes part in the local plane
+    fit of each iteration; 0 fits no planes. (number, 0 to 1, fraction of the inverse depth; default: 0.02,
+    fast: 0.03, paper: 0)"""
     search_depth_perturbation: float
     """From the second cycle on, half the range of inverse depths in which food sources start around a
     validated estimate, halved each cycle of a scale; 0 starts them at random. Around an estimate that is not
