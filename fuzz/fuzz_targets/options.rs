@@ -3,4 +3,6 @@
 #[path = "../targets/mod.rs"]
 mod targets;
 
-libfuzzer_sys::fuzz_target!(|input: &[u8]| targets::run("options", input));
+libfuzzer_sys::fuzz_target!(|input: &[u8]| {
+    targets::run("options", input);
+});

@@ -372,7 +372,7 @@ fn is_no_size(width: u32, height: u32) -> bool {
 }
 
 /// Pictures, masks, points, lists, maps and texts in buffers.
-pub fn pixels_and_arrays(input: &[u8]) {
+pub fn pixels_and_arrays(input: &[u8]) -> bool {
     let mut arguments = Arguments(input);
     let (mut scene, mut options) = (null_mut(), null_mut());
     // SAFETY: out-pointers to variables.
@@ -395,6 +395,8 @@ pub fn pixels_and_arrays(input: &[u8]) {
         skep_options_destroy(options);
         skep_scene_destroy(scene);
     }
+    // Most inputs have calls that are refused.
+    calls > 0
 }
 
 /// One call; `None` where its buffers would be too large.
@@ -589,8 +591,8 @@ fn write_maps(arguments: &mut Arguments) -> Option<()> {
 }
 
 /// Maps that are read into buffers: the kind, two capacities, and the file.
-pub fn files(input: &[u8]) {
-    let Some((&[kind, room, views], content)) = input.split_first_chunk::<3>() else { return };
+pub fn files(input: &[u8]) -> bool {
+    let Some((&[kind, room, views], content)) = input.split_first_chunk::<3>() else { return false };
     FOLDER.with(|folder| write(&folder.path().join("map.bin"), content));
     let file = path();
     let (capacity, view_capacity) = (usize::from(room), usize::from(views));
@@ -614,6 +616,6 @@ pub fn files(input: &[u8]) {
                 &mut total,
             ),
         };
-        checked(status);
+        checked(status)
     }
 }

@@ -13,8 +13,8 @@ mod texts;
 use std::path::Path;
 use tempfile::TempDir;
 
-/// What a target does with its input.
-pub type Body = fn(&[u8]);
+/// What a target does with its input; whether it was accepted, and did not merely end in errors.
+pub type Body = fn(&[u8]) -> bool;
 
 /// The targets by name.
 pub const TARGETS: [(&str, Body); 12] = [
@@ -32,10 +32,10 @@ pub const TARGETS: [(&str, Body); 12] = [
     ("c_files", c_api::files),
 ];
 
-/// Runs the target of this name.
-pub fn run(name: &str, input: &[u8]) {
+/// Runs the target of this name; whether the input was accepted.
+pub fn run(name: &str, input: &[u8]) -> bool {
     let (_, body) = TARGETS.iter().find(|(known, _)| *known == name).expect("a target of this name");
-    body(input);
+    body(input)
 }
 
 /// Stands between the files of an input.

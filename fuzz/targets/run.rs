@@ -147,16 +147,17 @@ fn replaced(content: &[u8], from: &[u8], to: &[u8]) -> Vec<u8> {
 }
 
 /// A file of a run's folder, as the first byte says, whose checksum is right.
-pub fn run_files(input: &[u8]) {
-    let Some((kind, content)) = input.split_first() else { return };
-    let Some((_, name)) = FILES.iter().find(|(known, _)| known == kind) else { return };
+pub fn run_files(input: &[u8]) -> bool {
+    let Some((kind, content)) = input.split_first() else { return false };
+    let Some((_, name)) = FILES.iter().find(|(known, _)| known == kind) else { return false };
     RUN.with(|run| {
         run.restore();
         let root = run.root();
         write(&root.join(name), &run.complete(name, content));
         let _ = read_state(&root);
-        let Ok(job) = Job::open(&root, &Options { threads: 1, ..Options::default() }) else { return };
+        let Ok(job) = Job::open(&root, &Options { threads: 1, ..Options::default() }) else { return false };
         let _ = (job.checked(0, 0), job.is_complete(), job.summary().map(drop));
+        let mut is_read = true;
         if matches!(kind, b'e' | b'k' | b'u') {
             // The check reads searched estimates, the search of the next cycle checked ones.
             let (task, done) = match kind {
@@ -164,9 +165,10 @@ pub fn run_files(input: &[u8]) {
                 _ => (Task::Search { cycle: 1, view: 0 }, "cycle01-search-00000.json"),
             };
             let _ = std::fs::remove_file(root.join("run/tasks").join(done));
-            let _ = job.run_task(task, &ignore_progress);
+            is_read = job.run_task(task, &ignore_progress).is_ok();
         }
-    });
+        is_read
+    })
 }
 
 /// The scene and the stepper of the estimates.
@@ -184,9 +186,9 @@ pub fn stepper() -> &'static (Scene, Stepper) {
 }
 
 /// Estimates as bytes: what is read is taken by the stages of a run.
-pub fn estimates(input: &[u8]) {
+pub fn estimates(input: &[u8]) -> bool {
     let (_, stepper) = stepper();
-    let Ok(found) = AnyEstimate::from_bytes(stepper, input) else { return };
+    let Ok(found) = AnyEstimate::from_bytes(stepper, input) else { return false };
     // Costs are rounded once they are read.
     let bytes = found.to_bytes();
     assert_eq!(bytes.len(), input.len());
@@ -211,4 +213,5 @@ pub fn estimates(input: &[u8]) {
             let _ = stepper.finish(view, &all, &ignore_progress);
         }
     }
+    true
 }

@@ -14,19 +14,20 @@ thread_local! {
 }
 
 /// Cameras, images and points of COLMAP as text.
-pub fn colmap_text(input: &[u8]) {
-    TEXT.with(|folder| read_model(folder.path(), ["cameras.txt", "images.txt", "points3D.txt"], input));
+pub fn colmap_text(input: &[u8]) -> bool {
+    TEXT.with(|folder| read_model(folder.path(), ["cameras.txt", "images.txt", "points3D.txt"], input))
 }
 
 /// Cameras, images and points of COLMAP as binary files.
-pub fn colmap_binary(input: &[u8]) {
-    BINARY.with(|folder| read_model(folder.path(), ["cameras.bin", "images.bin", "points3D.bin"], input));
+pub fn colmap_binary(input: &[u8]) -> bool {
+    BINARY.with(|folder| read_model(folder.path(), ["cameras.bin", "images.bin", "points3D.bin"], input))
 }
 
-fn read_model(folder: &Path, names: [&str; 3], input: &[u8]) {
+fn read_model(folder: &Path, names: [&str; 3], input: &[u8]) -> bool {
     write_parts(folder, &names, input);
-    let _ = ColmapModel::read_with_lenses(folder);
-    let Ok(model) = ColmapModel::read(folder) else { return };
+    let is_read = ColmapModel::read_with_lenses(folder).is_ok();
+    // This one refuses lenses with distortion.
+    let Ok(model) = ColmapModel::read(folder) else { return is_read };
     // What was read can be written, or is refused; what is written can be read.
     let copy = folder.join("copy");
     if model.write_binary(&copy).is_ok() {
@@ -35,6 +36,7 @@ fn read_model(folder: &Path, names: [&str; 3], input: &[u8]) {
         assert_eq!(again.points.len(), model.points.len());
     }
     let _ = std::fs::remove_dir_all(copy);
+    true
 }
 
 /// A folder of each format and the names of the input's files in it.
@@ -61,22 +63,23 @@ fn formats() -> TempDir {
 }
 
 /// Scenes of all programs; the first byte says which.
-pub fn scene_formats(input: &[u8]) {
-    let Some((kind, content)) = input.split_first() else { return };
-    let Some((_, name, names)) = FORMS.iter().find(|(known, ..)| known == kind) else { return };
+pub fn scene_formats(input: &[u8]) -> bool {
+    let Some((kind, content)) = input.split_first() else { return false };
+    let Some((_, name, names)) = FORMS.iter().find(|(known, ..)| known == kind) else { return false };
     if names_a_device(content) {
-        return;
+        return false;
     }
     FORMATS.with(|folder| {
         let folder = folder.path().join(name);
         write_parts(&folder, names, content);
-        let Ok(scene) = skep::import::read(&folder) else { return };
+        let Ok(scene) = skep::import::read(&folder) else { return false };
         if is_small(&scene) {
             let mut options = Options { threads: 1, ..Options::default() };
             options.input.alpha_mask = parts(content).len() > 1;
             let _ = skep::import::read_scene(&folder, None, &options, &skep::ignore_progress);
         }
-    });
+        true
+    })
 }
 
 /// Whether the photographs take no time to undistort.

@@ -14,8 +14,8 @@ thread_local! {
 }
 
 /// Lines `NAME=VALUE` that are set one after the other.
-pub fn options(input: &[u8]) {
-    let Ok(text) = std::str::from_utf8(input) else { return };
+pub fn options(input: &[u8]) -> bool {
+    let Ok(text) = std::str::from_utf8(input) else { return false };
     let mut options = Options::default();
     for line in text.lines() {
         let _ = skep::parse_bytes(line);
@@ -37,21 +37,22 @@ pub fn options(input: &[u8]) {
             Options::default().set(name, &value.to_string()).expect("the text of a value");
         }
     }
+    options != Options::default()
 }
 
 /// Patterns of photographs and of references, a box, and files of source views, depth ranges and patterns.
-pub fn lists(input: &[u8]) {
+pub fn lists(input: &[u8]) -> bool {
     if names_a_device(input) {
-        return;
+        return false;
     }
     let parts = parts(input);
     let text = |index: usize| std::str::from_utf8(parts.get(index).unwrap_or(&&b""[..])).ok();
     SCENE.with(|folder| {
         let mut options = Options { threads: 1, ..Options::default() };
-        let (Some(images), Some(reference), Some(bounds)) = (text(0), text(1), text(2)) else { return };
+        let (Some(images), Some(reference), Some(bounds)) = (text(0), text(1), text(2)) else { return false };
         for (name, value) in [("images", images), ("reference", reference), ("bounds", bounds)] {
             if options.set(&format!("input.{name}"), value).is_err() {
-                return;
+                return false;
             }
         }
         for (index, name) in [(3, "sources"), (4, "depth_ranges"), (5, "images")] {
@@ -61,8 +62,6 @@ pub fn lists(input: &[u8]) {
             let _ = options.set(&format!("input.{name}"), path.to_str().expect("UTF-8"));
         }
         let read = skep::import::read_scene(folder.path(), None, &options, &skep::ignore_progress);
-        if let Ok(scene) = read {
-            let _ = Stepper::new(&scene, &options);
-        }
-    });
+        read.is_ok_and(|scene| Stepper::new(&scene, &options).is_ok())
+    })
 }

@@ -1,5 +1,6 @@
-//! The bodies of the fuzz targets (`fuzz/targets/`) with the seeds of `fuzz/seeds/` and mutations of them, the
-//! same in every run: no panic, and no allocation beyond a bound.
+//! The bodies of the fuzz targets (`fuzz/targets/`) with the seeds of `fuzz/seeds/` and mutations of them,
+//! the same in every run: no panic, and no allocation beyond a bound. A seed is accepted, unless its name
+//! starts with `found`: these made the fuzzer report a fault that is mended.
 //!
 //! `SKEP_UPDATE_SEEDS=1 cargo test --all-features --test fuzz_seeds` writes the seeds that are made by the
 //! writers of this crate; others were found by the fuzzer or written by hand.
@@ -129,7 +130,7 @@ fn mutations(seed: &[u8], count: usize) -> impl Iterator<Item = Vec<u8>> {
     truncated.chain(changed)
 }
 
-/// Removes the memory of the run of an input that panics: the message of the panic names the input.
+/// Runs a target with an input, and names the input where it panics or allocates too much.
 fn replay(target: &str, name: &str, number: usize, input: &[u8]) {
     LARGEST.store(0, Ordering::Relaxed);
     let outcome = std::panic::catch_unwind(|| targets::run(target, input));
@@ -158,8 +159,11 @@ fn no_seed_and_no_mutation_of_one_panics_or_allocates_much() {
         let found = seeds_of(target);
         assert!(!found.is_empty(), "{target} has no seeds");
         let mut inputs = 0;
-        // Once without a look: what stays in memory is made by the first input.
-        targets::run(target, &found[0].1);
+        // Once without a look at the allocations: what stays in memory is made by the first input.
+        for (name, seed) in &found {
+            let is_accepted = targets::run(target, seed);
+            assert!(is_accepted || name.starts_with("found"), "{target}/{name} is refused");
+        }
         for (name, seed) in &found {
             assert!(seed.len() <= 4096, "{target}/{name} has {} bytes", seed.len());
             for (number, input) in std::iter::once(seed.clone()).chain(mutations(seed, count)).enumerate() {
