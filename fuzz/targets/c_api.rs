@@ -503,7 +503,7 @@ fn fuse(arguments: &mut Arguments, options: Object) -> Option<()> {
         let overlap: Vec<u32> = (0..arguments.byte() % 4).map(|_| arguments.index()).collect();
         let list = Buffer::of_indices(&overlap);
         cameras.push(Box::new(arguments.camera()));
-        let has_confidence = arguments.byte() % 2 == 0;
+        let has_confidence = arguments.byte().is_multiple_of(2);
         views.push(FusionView {
             camera: &**cameras.last()?,
             width,
