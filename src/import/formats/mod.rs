@@ -93,8 +93,10 @@ pub fn read(path: &Path) -> Result<SourceScene> {
     let Some(format) = FORMATS.iter().find(|format| (format.is_at)(path)) else {
         let looked_for = FORMATS.iter().map(|format| format.looked_for).collect::<Vec<_>>().join("; ");
         let problem = match holds_photographs(path) {
-            true => "photographs without cameras: COLMAP finds these, as the README shows under \"From your \
-                     own photographs\"",
+            true => {
+                "photographs without cameras: COLMAP finds these, as the README shows under \"From your \
+                     own photographs\""
+            }
             false => "no scene",
         };
         return Err(Error::file(path, format!("{problem}; expected one of: {looked_for}")));
