@@ -144,7 +144,7 @@ fn smoothing_makes_normals_more_exact() {
 }
 
 #[test]
-fn planes_fitted_to_depths_make_normals_more_exact() {
+fn planes_fitted_to_depths_in_the_first_cycle_make_normals_more_exact() {
     let made = procedural::plane_and_sphere().only(&[1, 3, 4, 5, 7]);
     // Smoothing averages normals too.
     let plain = changed(Options::default(), |o| {
@@ -157,5 +157,5 @@ fn planes_fitted_to_depths_make_normals_more_exact() {
             o.search.local_plane_tolerance = 0.0;
         }),
     );
-    assert!(with < 0.8 * without, "{with} degrees with fitted planes and {without} without");
+    assert!(with < 0.95 * without, "{with} degrees with fitted planes and {without} without");
 }
