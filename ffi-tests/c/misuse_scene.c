@@ -99,7 +99,7 @@ static void check_options(void) {
     FAILS(skep_options_create("\xFF", OUT(skep_options *, 0)), SKEP_ERR_ARGUMENT, "UTF-8");
     FAILS(skep_options_set(NULL, "smoothness_reward", 0), SKEP_ERR_NULL, "options");
     FAILS(skep_options_set(options, NULL, 0), SKEP_ERR_NULL, "name");
-    FAILS(skep_options_set(options, "", 0), SKEP_ERR_ARGUMENT, "smoothness_reward");
+    FAILS(skep_options_set(options, "", 0), SKEP_ERR_ARGUMENT, "an option of a group");
     FAILS(skep_options_set(options, "rewards", 0), SKEP_ERR_ARGUMENT, "rewards");
     FAILS(skep_options_set(options, "\xC0\x80", 0), SKEP_ERR_ARGUMENT, "name");
     static const struct {
