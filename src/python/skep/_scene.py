@@ -65,7 +65,7 @@ class Scene(NotPickled):
         near, far = depth_range or (0.0, 0.0)
         place, chosen = to_path(path, "path"), _options.handle(options)
 
-        def call(callback: Any, user: Any, out: Any) -> int:
+        def call(callback: Any, user: Any, out: Any) -> Any:
             return lib.skep_scene_read(place, chosen, near, far, callback, user, out)
 
         scene = cls.__new__(cls)
