@@ -76,7 +76,7 @@ impl SmoothnessTerm {
     #[inline(always)]
     pub(super) fn cost(&self, food: &FoodSource) -> f32 {
         let SmoothnessRules { max_depth_error, max_normal_error, .. } = self.rules;
-        // Divisions of all neighbors together.
+        // The neighbors share the divisions.
         let (per_depth, per_normal) = (1.0 / (food.depth * max_depth_error), 1.0 / max_normal_error);
         let mut sum = 0.0;
         for prediction in &self.predictions[..self.count] {

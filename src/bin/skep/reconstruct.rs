@@ -217,8 +217,8 @@ fn needs(job: &Job) -> String {
         _ => format!("{:.1} h", seconds / 3600.0),
     };
     format!(
-        "{} views; about {time} on {threads} threads, {} of memory (limit {}, --memory; it works with {}) and \
-         {} on disk",
+        "{} views; about {time} on {threads} threads, {} of memory (limit {}, --memory; it works with {}) \
+         and {} on disk",
         job.scene().views().len(),
         format_bytes(expected_memory),
         format_bytes(memory),
